@@ -11,7 +11,9 @@ from source_trees import nodes_in
 PACKAGE = Path(__file__).resolve().parent.parent / "grader"
 #: Module or function -> what it parses. A module stands for everything in it.
 PARSERS: Mapping[str, str] = {
-    **dict.fromkeys(("ast.parse", "ast.literal_eval", "compile", "tokenize", "symtable", "codeop", "libcst"), "Python"),
+    **dict.fromkeys(
+        ("ast.parse", "ast.literal_eval", "compile", "tokenize", "symtable", "codeop", "libcst", "copydetect"), "Python"
+    ),
     # functions of the grader that parse what they are given, wherever they are called
     **dict.fromkeys(
         (

@@ -80,6 +80,15 @@ def test_nothing_in_the_grader_reads_a_submission_outside_of_the_contained_proce
         assert path.stem in CONTAINED or not re.search(known, text, re.MULTILINE), path
 
 
+def test_mutation_meets_no_program_of_a_student() -> None:
+    """It parses the reference solution that an author's rubric names, for `grade selftest` alone."""
+    package = PACKAGE / "course" / "mutation"
+    importing = re.compile(r"^\s*(from|import) .*\bcourse(\.| import )mutation\b", re.MULTILINE)
+    users = {path for path in PACKAGE.rglob("*.py") if importing.search(path.read_text(encoding="utf-8"))}
+    outside = {path.relative_to(PACKAGE).as_posix() for path in users if not path.is_relative_to(package)}
+    assert outside == {"cli/selftest.py"}
+
+
 def test_no_trusted_process_parses_the_programs_of_students() -> None:
     """Neither to run them, nor to explain them. Who writes a row that is not listed here has to say why."""
     page = PAGE.read_text(encoding="utf-8")
@@ -90,6 +99,6 @@ def test_no_trusted_process_parses_the_programs_of_students() -> None:
         if {"Python", "text in any encoding"} & set(kinds.split(", "))
     }
     assert parse == {
-        "grader/runtime/worker/bare_start.py",  # in the worker, which has a sandbox
-        "grader/course/similarity/finding.py",  # splits texts into tokens
+        "grader/course/similarity/library.py",  # splits texts into tokens
+        "grader/grading/submissions/source_encodings.py",  # looks for the declaration of an encoding
     }

@@ -53,6 +53,9 @@ _RERUNS = ("changed", "failed", "undecided", "all")
 )
 @run_options(BATCH)
 @click.option("--seed-key", type=PATH, metavar="FILE", help="Draw values by this key, not by the one kept in RESULTS.")
+@click.option(
+    "--title", default="", metavar="TEXT", help="Title of the page of the class; else the names of the sources."
+)
 @click.option("--standalone", is_flag=True, help="Make each HTML report a single file that can be sent away.")
 @click.option("--canvas", metavar="NUMBER", help="Write canvas.csv for the assignment of this number.")
 @click.option("--canvas-gradebook", type=PATH, metavar="CSV", help="The gradebook that Canvas exported.")
@@ -82,6 +85,7 @@ def command(  # noqa: PLR0913  one parameter an option
     rerun: str,
     options: GradingOptions,
     seed_key: Path | None,
+    title: str,
     standalone: bool,
     canvas: str | None,
     canvas_gradebook: Path | None,
@@ -133,6 +137,7 @@ def command(  # noqa: PLR0913  one parameter an option
         rerun=rerun,
         runs_here=scheduler is None,
         seed_key=drawn_with(options.seed, seed_key),
+        title=title,
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
         given=read_given(templates or (shipped("student_template"),)) if similarity else None,

@@ -28,6 +28,7 @@ KEPT = (
     *names(BATCH),
     "odom_bag",
     "seed_key",
+    "title",
     "standalone",
     "canvas",
     "canvas_gradebook",

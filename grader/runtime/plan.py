@@ -8,7 +8,7 @@ import posixpath
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from shlex import quote
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.runtime.host.packages import layout_of
@@ -17,14 +17,12 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.projects import Project
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Event, Planned, RunOptions, Scenario, is_launch_file, longest, shortest
+from grader.runtime.model.submission import Beginning, Submission
 from grader.runtime.model.trace import Endpoint
 from grader.runtime.stimuli import KINDS
 from grader.runtime.stimuli.drawing import Draws, drawn_time
 from grader.runtime.stimuli.events import in_order
 from grader.runtime.stimuli.recorded import RecordedStream, Recording
-
-if TYPE_CHECKING:
-    from grader.runtime.model.submission import Submission
 
 #: The most characters of what a process is started with, as JSON. It is handed over as one argument of a program, for
 #: which Linux allows 128 KiB (MAX_ARG_STRLEN, execve(2)); a large parameter file of a course has 10.
@@ -129,6 +127,7 @@ class Plan:
         working: The absolute folder in which the processes start, which then run their files where these lie; empty to
             give each copies and a folder of its own.
         environment: Further variables of the processes.
+        begins: What each Python file of the submission starts, by its path, of those that Python can parse.
         connections: The topics on which messages are late or lost.
     """
 
@@ -161,6 +160,7 @@ class Plan:
     working: str = ""
     environment: tuple[tuple[str, str], ...] = ()
     connections: tuple[PlannedConnection, ...] = ()
+    begins: tuple[tuple[str, Beginning], ...] = ()
 
     def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
         """Return the stimuli of a kind."""
@@ -257,6 +257,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         shutdown_ns=scenario.shutdown_ns,
         starts=tuple(start for name in scenario.processes if (start := _start(name, scenario, submission)) is not None),
         projects=submission.projects,
+        begins=tuple((path, read.begins) for path, read in submission.programs.items() if read.begins is not None),
         connections=tuple(
             PlannedConnection(
                 one.topic,

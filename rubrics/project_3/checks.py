@@ -384,12 +384,14 @@ class _Words:
 
     Attributes:
         before: Shapes of the texts before the first response.
+        at_first: What wrote before the first response, or while the client waited for another.
         clear: Whether no response came at the instant of its request, where output of two responses looks alike.
     """
 
     clock: ClockKind
     episodes: tuple[Episode, ...]
     before: frozenset[str]
+    at_first: frozenset[tuple[str, int]]
     clear: bool
 
     def of(self, *kinds: CallKind) -> list[Episode]:
@@ -450,7 +452,8 @@ class _Words:
         """Return output after a useless response that tells of a start in words that no good response had.
 
         The same call writes after each good response, and after no low one: its texts begin and end alike, and differ
-        only in between, such as in the name of a mission.
+        only in between, such as in the name of a mission. Without a common word, the call names something else each
+        time, and the client does what it does after each good response, and nothing else.
         """
         good, low = self.of(CallKind.GOOD), self.of(CallKind.LOW)
         elsewhere = {_origin(o) for e in low for o in e.outputs if isinstance(o, LogRecord)}
@@ -465,9 +468,25 @@ class _Words:
             named = any(len(t) >= _LETTERS and t.isalpha() for t in (*begin, *end))
             behind = len(mine) - len(end)
             alike = behind > len(begin) and mine[: len(begin)] == begin and mine[behind:] == end
-            if len(set(texts)) > 1 and named and alike:
+            if len(set(texts)) > 1 and (alike if named else self._named_anew(output, texts, episode)):
                 return output
         return None
+
+    def _named_anew(self, output: _Output, texts: Sequence[tuple[str, ...]], episode: Episode) -> bool:
+        """Return whether a call that writes another text after each good response does so after a useless one too.
+
+        Args:
+            output: What it wrote after the useless response.
+            texts: The words that it wrote after each good one.
+            episode: The useless response.
+        """
+        origins = [_origin(o) for o in episode.sure]
+        if not isinstance(output, LogRecord) or origins.count(_origin(output)) > 1 or _origin(output) in self.at_first:
+            return False  # a method of the client, or a stream, that writes whatever there is to write
+        told = _words_in((output,)) & {t for t in _tokens(episode.text) if len(t) > _LETTERS}
+        shows = _quotes(output, episode) or bool(told)
+        as_ever = all([_origin(o) for o in e.sure] == origins for e in self.of(CallKind.GOOD))
+        return as_ever and not shows and len({*texts, _tokens(output.text)}) > len(texts)
 
     @property
     def shared(self) -> tuple[_Output, float] | None:
@@ -573,7 +592,10 @@ class _Decides:
         lows = any(e.kind is CallKind.LOW for e in episodes)
         answered = [e for e in episodes if e.kind is not CallKind.UNANSWERED]
         before = self._shapes_before(trace, answered[0], cautious=not lows) if answered else frozenset[str]()
-        return _Words(trace.clock, episodes, before, all(e.start_ns > e.asked_ns for e in answered))
+        until_ns = answered[0].asked_ns if answered else trace.stop_ns
+        early = [o for o in written(trace, self.process) if o.t_ns < until_ns]
+        at_first = frozenset(_origin(o) for outputs in (early, *(e.awaiting for e in episodes)) for o in outputs)
+        return _Words(trace.clock, episodes, before, at_first, all(e.start_ns > e.asked_ns for e in answered))
 
     def _shapes_before(self, trace: Trace, first: Episode, *, cautious: bool) -> frozenset[str]:
         """Return the shapes of the texts before the first response; `cautious` adds its instant if it came at once."""
@@ -789,9 +811,10 @@ class NoGoWithoutAnswer(_Decides):
     of them, or else some of them, and come neither before the first response, nor after a number at or below the
     threshold, nor after a useless response of another kind. None of these may come between a useless response and the
     next request, nor may the call that writes them write a text that begins and ends alike, as with the name of another
-    mission. If there are no such words, nothing shows whether the client continues. A crash at a useless response
-    is reported and costs nothing. The server should respond with a delay, to separate output before and after a
-    response, and one of its responses should be of another kind; without these, unclear cases are accepted.
+    mission, or one more text of its own where it writes another one each time. If there are no such words, nothing
+    shows whether the client continues. A crash at a useless response is reported and costs nothing. The server should
+    respond with a delay, to separate output before and after a response, and one of its responses should be of another
+    kind; without these, unclear cases are accepted.
 
     Attributes:
         process: File name of the client.

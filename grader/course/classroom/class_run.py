@@ -243,7 +243,7 @@ def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: G
     """Describe this run; it counts as stopped if there is no result."""
     return RunOfClass(
         conditions=conditions,
-        title=title_of(course.sources),
+        title=course.title.strip() or title_of(course.sources),
         written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         jobs=course.jobs or len(os.sched_getaffinity(0)),
         took_s=time.monotonic() - began_s,

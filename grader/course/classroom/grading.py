@@ -61,6 +61,7 @@ class ClassRequest:
     rerun: str = CHANGED  # `--rerun`, one of the values above
     seed_key: SeedKey | None = None  # the key that seeds are derived from; None for the one stored with the results
     runs_here: bool = True  # whether programs run on this machine, where the kept recordings are
+    title: str = ""  # of the page; empty for the names of the sources
     standalone: bool = False  # whether each HTML report is self-contained
     platforms: Platforms = _NO_PLATFORMS
     # Code handed out to everyone, ignored when submissions are compared; None to skip the comparison

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import tempfile
-import tokenize
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -28,6 +26,7 @@ from grader.course.similarity.library import (
     overlap_of,
 )
 from grader.grading.submissions.collected import Collected
+from grader.grading.submissions.source_encodings import UNUSUAL, USUAL, encoding_of
 from grader.grading.submissions.submission import collect_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, GraderError
@@ -73,12 +72,9 @@ def programs_of(collected: Collected) -> tuple[tuple[ComparedProgram, ...], tupl
 
 
 def text_of(content: bytes) -> str:
-    """Decode a Python file in its declared encoding; invalid bytes become U+FFFD."""
-    try:
-        encoding, _ = tokenize.detect_encoding(io.BytesIO(content).readline)
-        text = content.decode(encoding, "replace")
-    except (SyntaxError, LookupError, ValueError):
-        text = content.decode("utf-8", "replace")
+    """Decode a Python file in its declared encoding, if that takes linear time; invalid bytes become U+FFFD."""
+    encoding = encoding_of(content)
+    text = content.decode(encoding if encoding in USUAL | UNUSUAL else "utf-8", "replace")
     return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
 
 

@@ -270,9 +270,9 @@ def _imported(index: Mapping[type[ast.AST], list[Any]]) -> tuple[dict[str, str],
     return aliases, tuple(stars)
 
 
-def _place(node: ast.AST) -> tuple[int, int, int]:
-    """Return a sort key that follows the text and puts outer nodes before inner ones."""
-    return first_line(node), getattr(node, "col_offset", 0), -last_line(node)
+def _place(node: Any) -> tuple[int, int, int]:
+    """Return a sort key, of a node that has a place, that follows the text and puts outer nodes before inner ones."""
+    return node.lineno, node.col_offset, -(node.end_lineno or node.lineno)
 
 
 def parsed(text: str) -> ast.Module | None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TypeVar
@@ -17,11 +18,17 @@ from grader.grading.judging.values import as_number
 from grader.grading.model.report import Pace, Summary, TopicSummary
 from grader.runtime.model.extras import pip_install
 from grader.runtime.model.quantities import NS_PER_S, seconds
-from grader.runtime.model.trace import Fault, Message, Offer, Trace
+from grader.runtime.model.trace import Fault, FaultKind, LogRecord, Message, Offer, Trace
 
 #: The different values of a text field that a summary names, and the elements of an array that it looks at: enough for
 #: a laser scan, and quick for an image.
 MOST_TEXTS, MOST_ELEMENTS = 100, 2_000
+#: What rclpy logs of an action's execute callback that raises, whose traceback it prints, or sets no state of the goal.
+_RAISED, _NO_STATE = "Error raised in execute callback: ", "Goal state not set, assuming aborted."
+#: So many of them are looked at, each among all that its program has written.
+MOST_CAUGHT = 20
+_TRACEBACK = "Traceback (most recent call last):"
+_FRAME = re.compile(r'\s+File "([^"]+)", line (\d+), in (\S+)')
 
 
 def summarise(
@@ -41,7 +48,9 @@ def summarise(
         served: The services that simulations offer.
     """
     graphs = trace.graphs()
-    seen = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served))
+    caught = _caught(trace)
+    faults = (*trace.faults(), *caught)
+    seen = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served), *_stateless(trace))
     notes = (*seen, *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(
@@ -54,14 +63,51 @@ def summarise(
         offers=tuple(o for o in trace.observations if isinstance(o, Offer)),
         records=trace.records(),
         lines=trace.lines(),
-        faults=trace.faults(),
+        faults=faults,
         notes=placed_in(notes, sources),
         starts=trace.starts,
-        hints=tuple(_hint(fault, trace, sources) for fault in trace.faults()),
+        hints=tuple(_hint(fault, trace, sources) for fault in faults),
         # of those of equal size the last, whose parts have all been matched
         graph=max(reversed(graphs), key=lambda g: len(g.endpoints) + len(g.services) + len(g.nodes), default=None),
         isolation=isolation,
     )
+
+
+def _caught(trace: Trace) -> tuple[Fault, ...]:
+    """Return the exceptions of actions' execute callbacks, which end no program: rclpy logs and prints them."""
+    found: dict[tuple[str, str, str, int], Fault] = {}
+    raised = (record for record in trace.records() if _is_of_action(record, _RAISED))
+    for record in itertools.islice(raised, MOST_CAUGHT):
+        printed = [o.text for o in trace.lines() if o.process == record.process and o.stream == "stderr"]
+        said = record.text.removeprefix(_RAISED).split("\n")[0]
+        for place in (n for n, text in enumerate(printed) if text == _TRACEBACK):
+            block = list(itertools.takewhile(lambda text: text.startswith(" "), printed[place + 1 :]))
+            last = next(iter(printed[place + 1 + len(block) :]), "")
+            frames = [match for text in block if (match := _FRAME.match(text)) and not match[1].startswith("/")]
+            if not last.endswith(said) or not frames:
+                continue
+            file, line = frames[-1][1], int(frames[-1][2])
+            chain = tuple(f"{match[1]}:{match[2]} in {match[3]}" for match in frames)
+            fault = Fault(record.t_ns, record.process, FaultKind.EXCEPTION, last, file, line, chain)
+            found.setdefault((record.process, last, file, line), fault)
+            break
+    return tuple(found.values())
+
+
+def _stateless(trace: Trace) -> Iterator[str]:
+    """Yield a note for each program whose action ends goals without a state, where no exception is the cause."""
+    ends: dict[str, list[bool]] = {}
+    for record in trace.records():
+        if _is_of_action(record, _NO_STATE) or _is_of_action(record, _RAISED):
+            ends.setdefault(record.process, []).append(record.text.startswith(_NO_STATE))
+    for process, kinds in ends.items():
+        # each exception is followed by a goal without a state
+        if kinds.count(True) > kinds.count(False):
+            yield f"{process}: an action ends without goal_handle.succeed(), so its goal counts as aborted"
+
+
+def _is_of_action(record: LogRecord, text: str) -> bool:
+    return record.logger.endswith(".action_server") and record.text.startswith(text)
 
 
 def _hint(fault: Fault, trace: Trace, sources: Mapping[str, str]) -> str:

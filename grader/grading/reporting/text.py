@@ -184,13 +184,12 @@ def _exercise(page: Page, exercise: ExerciseReport) -> None:
     column = max((len(_share(verdict)) for verdict in exercise.verdicts), default=0)
     for verdict in exercise.verdicts:
         _verdict(page, verdict, _share(verdict).rjust(column))
-    for fault in exercise.faults[:MOST_FAULTS]:
+    for fault in exercise.faults:
         _fault(page, fault)
-    _more(page, len(exercise.faults) - MOST_FAULTS, "faults")
     _graph(page, exercise)
     if exercise.clock is ClockKind.WALL:
         page.put(f"judged on the wall clock: {shown(exercise.clock_reason)}", prefix="  note: ")
-    _notes(page, exercise.notes, indent="  ")
+    _notes(page, exercise.notes, indent="  ", most=len(exercise.notes))
 
 
 def _verdict(page: Page, verdict: Verdict, share: str) -> None:
@@ -234,19 +233,20 @@ def _graph(page: Page, exercise: ExerciseReport) -> None:
         page.put(line.lstrip(), prefix=" " * (4 + len(line) - len(line.lstrip())))
 
 
-def _notes(page: Page, notes: Sequence[str], *, indent: str) -> None:
-    for note in notes[:MOST_NOTES]:
+def _notes(page: Page, notes: Sequence[str], *, indent: str, most: int = MOST_NOTES) -> None:
+    for note in notes[:most]:
         page.put(shown(note), prefix=f"{indent}note: ")
-    _more(page, len(notes) - MOST_NOTES, "notes", indent=indent)
+    _more(page, len(notes) - most, "notes", indent=indent)
 
 
 def _more(page: Page, count: int, what: str, *, indent: str = "  ") -> None:
     if count > 0:
-        page.put(f"and {count} more {what}; all are in the JSON report", prefix=indent)
+        page.put(f"and {count} more {what}; -v shows all", prefix=indent)
 
 
 def _foot(page: Page, report: Report) -> None:
-    _notes(page, wording.relevant_notes(report), indent="")
+    notes = wording.relevant_notes(report)
+    _notes(page, notes, indent="", most=len(notes))
     page.put(wording.run_line(report), style="dim")
     for name, value in wording.reproduction(report):
         loud = name == "isolation" and wording.ran_without_sandbox(report)

@@ -10,7 +10,6 @@ import encodings
 import encodings.aliases
 import io
 import os
-import tokenize
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -27,43 +26,10 @@ from grader.grading.submissions.answers import (
     UNREADABLE,
 )
 from grader.grading.submissions.reaching import reaching
+from grader.grading.submissions.source_encodings import BOM, UNUSUAL, USUAL, encoding_of
 from grader.runtime.model.limits import MAX_PARSED_BYTES
+from grader.runtime.programs.beginning import beginning_of
 from grader.runtime.programs.inert import is_inert, read
-
-#: Encodings in which editors save programs, by their modules, and others that real programs have, whose declaration is
-#: unusual enough to be noticed. All take linear time; `punycode` and `idna` do not.
-USUAL = frozenset(
-    (
-        *("utf_8", "ascii", "latin_1"),
-        *(f"iso8859_{part}" for part in range(1, 17)),
-        *(f"cp125{part}" for part in range(9)),
-    )
-)
-UNUSUAL = frozenset(
-    [
-        "gbk",
-        "gb2312",
-        "gb18030",
-        "big5",
-        "big5hkscs",
-        "cp950",
-        "shift_jis",
-        "cp932",
-        "euc_jp",
-        "euc_kr",
-        "cp949",
-        "koi8_r",
-        "koi8_u",
-        "mac_roman",
-        "cp437",
-        "cp850",
-        "cp866",
-        "tis_620",
-    ]
-)
-#: How much of a file is searched for its encoding, which stands in the first two lines.
-HEAD_BYTES = 400
-_BOM = b"\xef\xbb\xbf"
 
 
 class Described(NamedTuple):
@@ -81,27 +47,6 @@ def prepare(contents: Iterable[bytes]) -> frozenset[str]:
         codecs.lookup(encoding)
     names = os.listdir(os.path.dirname(encodings.__file__ or ""))  # noqa: PTH120, PTH208 - imports nothing more
     return frozenset(name.removesuffix(".py") for name in names) | frozenset(encodings.aliases.aliases)
-
-
-def encoding_of(content: bytes) -> str:
-    """Return the encoding that a file declares, as the name of its module; UTF-8 if it declares none."""
-    for line in content[:HEAD_BYTES].removeprefix(_BOM).split(b"\n", 2)[:2]:
-        text = line.decode("latin-1")
-        found = tokenize.cookie_re.match(text)
-        if found is not None:
-            return _module_of(found[1])
-        if text.strip() and not text.lstrip().startswith("#"):
-            break
-    return "utf_8"
-
-
-def _module_of(name: str) -> str:
-    plain = encodings.normalize_encoding(name).lower()
-    # Python takes these with anything behind them, such as `utf-8-unix`
-    for begin, module in (("utf_8", "utf_8"), ("latin_1", "latin_1"), ("iso_8859_1_", "latin_1")):
-        if plain == begin.rstrip("_") or plain.startswith(f"{begin.rstrip('_')}_"):
-            return module
-    return encodings.aliases.aliases.get(plain, plain)
 
 
 def described(  # noqa: PLR0911  one for each kind of file
@@ -130,7 +75,11 @@ def described(  # noqa: PLR0911  one for each kind of file
         return Described({"reaches": [*odd], **({"error": error} if parsable else {})}, told)
     if found is None:
         return Described({"reaches": [LONG_FILE, *odd], "problem": DEEP}, told)
-    state = {"inert": parsable and is_inert(found)}
+    state: dict[str, Any] = {"inert": parsable and is_inert(found)}
+    if parsable:
+        begins = beginning_of(found)
+        node = begins.node if len(begins.node) <= NAME_CHARACTERS else ""
+        state["begins"] = [begins.starts, begins.main, begins.offers_main, node]
     if text is None:  # Python decodes it otherwise than texts are read here
         return Described({"reaches": [*odd], **state})
     nodes, depth = measured(found)
@@ -143,10 +92,10 @@ def described(  # noqa: PLR0911  one for each kind of file
 
 def _decoded(content: bytes, encoding: str) -> str | None:
     """Return the text of a file; None if it is not text in its encoding."""
-    if content.startswith(_BOM) and encoding != "utf_8":
+    if content.startswith(BOM) and encoding != "utf_8":
         return None
     try:
-        return io.TextIOWrapper(io.BytesIO(content.removeprefix(_BOM)), encoding, newline=None).read()
+        return io.TextIOWrapper(io.BytesIO(content.removeprefix(BOM)), encoding, newline=None).read()
     except (UnicodeError, LookupError):
         return None
 

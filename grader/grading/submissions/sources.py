@@ -22,7 +22,7 @@ from grader.grading.submissions.answers import (
 )
 from grader.grading.submissions.contained_reader import Asked, ReaderAnswer, Tell, content_of, told_by_process
 from grader.runtime.model.limits import MAX_PROGRAM_BYTES, MAX_SOURCE_BYTES
-from grader.runtime.model.submission import CompileError, ReadProgram, SourceText, Submission
+from grader.runtime.model.submission import Beginning, CompileError, ReadProgram, SourceText, Submission
 from grader.runtime.model.wording import first_of
 
 __all__ = ["COMPILED", "HASHES", "LONG_FILE", "UNREADABLE", "Programs", "read_programs", "read_reaches", "read_sources"]
@@ -111,10 +111,21 @@ def _checked(row: Mapping[str, Any], text: bytes, tree: bytes) -> ReadProgram:
     return ReadProgram(
         read,
         inert=row.get("inert") is True,
+        begins=_begins(row.get("begins")),
         error=_error(error),
         reaches=tuple(name[:NAME_CHARACTERS] for name in names[: 2 * MOST_NAMES]),
         told="text" in row or row.get("untold") is not True,
     )
+
+
+def _begins(told: Any) -> Beginning | None:
+    if not isinstance(told, list) or len(told) != 4:
+        return None
+    *facts, node = told
+    if not all(isinstance(fact, bool) for fact in facts) or not isinstance(node, str):
+        return None
+    starts, main, offers_main = facts
+    return Beginning(starts, main, offers_main, node if node.isidentifier() else "")
 
 
 def _error(told: Any) -> CompileError | None:

@@ -52,9 +52,9 @@ def main(limits: dict[str, Any]) -> int:
 
         toml = project_reader.prepare()
     if asked["programs"]:
-        from grader.grading.submissions import program_reader  # noqa: PLC0415
+        from grader.grading.submissions import program_reader, source_encodings  # noqa: PLC0415
 
-        heads = (bytes(contents[number][: program_reader.HEAD_BYTES]) for _, number in asked["programs"])
+        heads = (bytes(contents[number][: source_encodings.HEAD_BYTES]) for _, number in asked["programs"])
         known = program_reader.prepare(heads)
     warnings.simplefilter("ignore")  # a warning would want to show the line of a file
     gc.disable()  # there are no cycles

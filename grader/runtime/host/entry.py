@@ -24,6 +24,7 @@ from .packages import (
     import_folders,
     layout_of,
     never_true,
+    offers_main,
     parse,
     start_of,
 )
@@ -81,7 +82,7 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     path = os.path.join(root, file)
     tree = parse(path)  # raises a syntax error before any code has run
     layout = _layout_of(request)
-    start = start_of(root, file, layout, tree, request.get("executable", ""), request.get("scripts", ()))
+    start = start_of(root, file, layout, offers_main(tree), request.get("executable", ""), request.get("scripts", ()))
     shadows = shadows_of(request)
     how = {"way": start.way, "module": start.module, "function": start.function}
     # Before any code of the file: how it was started is needed most if it then ends at once.

@@ -22,17 +22,21 @@ def install_alarms(give_up: Callable[[], None]) -> None:
     """Call `give_up` before a real-time alarm is set; clearing one, or timing processor time, is allowed."""
     setitimer, alarm = signal.setitimer, signal.alarm
 
-    def guarded_setitimer(which: int, seconds: float, interval: float = 0.0, /) -> Any:
-        if which == signal.ITIMER_REAL and seconds > 0:
+    def guarded_setitimer(*arguments: Any, **named: Any) -> Any:
+        if len(arguments) > 1 and arguments[0] == signal.ITIMER_REAL and _is_positive(arguments[1]):
             give_up()
-        return setitimer(which, seconds, interval)
+        return setitimer(*arguments, **named)
 
-    def guarded_alarm(seconds: int, /) -> int:
-        if seconds > 0:
+    def guarded_alarm(*arguments: Any, **named: Any) -> int:
+        if arguments and _is_positive(arguments[0]):
             give_up()
-        return alarm(seconds)
+        return alarm(*arguments, **named)
 
     signal.setitimer, signal.alarm = guarded_setitimer, guarded_alarm
+
+
+def _is_positive(seconds: Any) -> bool:
+    return isinstance(seconds, (int, float)) and seconds > 0
 
 
 def install_events(give_up: Callable[[str], None]) -> None:

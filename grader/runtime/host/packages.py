@@ -156,7 +156,7 @@ def start_of(  # noqa: PLR0913  what is known of a file
     root: str,
     file: str,
     layout: PackageLayout,
-    tree: ast.Module,
+    offers_main: bool,
     executable: str = "",
     scripts: Sequence[Sequence[str]] = (),
 ) -> StartMethod:
@@ -166,7 +166,7 @@ def start_of(  # noqa: PLR0913  what is known of a file
         root: The submission's folder.
         file: The file, relative to `root`.
         layout: Its place in the package.
-        tree: Its parsed code.
+        offers_main: What `offers_main` says of it.
         executable: Name of the console script to prefer; empty for one with the name of the file.
         scripts: Name, module and function of each console script of its package.
     """
@@ -176,7 +176,7 @@ def start_of(  # noqa: PLR0913  what is known of a file
         found = _entry_point(root, file, layout, executable, scripts)
         if found is not None:
             return found
-    way = MAIN if _offers_main(tree) else MODULE
+    way = MAIN if offers_main else MODULE
     return StartMethod(way, layout.module, "main" if way == MAIN else "", layout.base)
 
 
@@ -200,13 +200,14 @@ def _entry_point(
     return max(found, key=lambda pair: pair[0], default=(False, None))[1]
 
 
-def _offers_main(tree: ast.Module) -> bool:
+def offers_main(tree: ast.Module) -> bool:
     """Return whether a module can be started by `main()`: it needs no arguments, and nothing else starts the module."""
     main = next((s for s in _top_level(tree.body) if _defines_main(s)), None)
     if main is None or (isinstance(main, ast.FunctionDef) and _must_be_given(main.args)):
         return False
     guards = [s for s in _top_level(tree.body) if is_guard(s)]
-    others = [s for s in tree.body if not never_true(s) and set(guards).isdisjoint(ast.walk(s))]
+    guarded = {*guards}
+    others = [s for s in tree.body if not never_true(s) and guarded.isdisjoint(ast.walk(s))]
     return not calls(others, "main") and (not guards or calls(guards, "main"))
 
 

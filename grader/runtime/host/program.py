@@ -208,6 +208,7 @@ def evaluate(request: dict[str, Any]) -> None:
         found = {"nodes": nodes, "left_out": left_out}
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = {"fault": describer.exception(error)}
+    flush()
     link.send({"kind": "launched", **found})
     originals.exit_now(0)
 
@@ -329,16 +330,17 @@ def exit_code(leaving: SystemExit) -> int:
 
 def seed_randomness(seed: str) -> None:
     """Make every source of randomness in this process repeatable for the same seed."""
-    source = random.Random(seed)  # noqa: S311 - it has to repeat
+    source, original_getrandom = random.Random(seed), os.getrandom  # noqa: S311 - it has to repeat
 
-    def urandom(count: int, /) -> bytes:
-        return source.randbytes(count)
+    def urandom(*arguments: Any, **named: Any) -> bytes:
+        return source.randbytes(len(originals.urandom(*arguments, **named)))  # which raises for what it does not take
 
-    def getrandom(size: int, flags: int = 0) -> bytes:
-        return urandom(size)
+    def getrandom(*arguments: Any, **named: Any) -> bytes:
+        return source.randbytes(len(original_getrandom(*arguments, **named)))
 
     seed_generator = random.Random.seed
 
+    @functools.wraps(seed_generator)
     def seed_from_source(self: random.Random, a: Any = None, version: int = 2) -> None:
         seed_generator(self, int.from_bytes(urandom(32), "big") if a is None else a, version)
 

@@ -4,16 +4,59 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib
 import os
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
-from types import FrameType, FunctionType, TracebackType
+from types import BuiltinFunctionType, FrameType, FunctionType, TracebackType
 from typing import Any
 
 _HOST = os.path.join(os.path.dirname(os.path.abspath(__file__)), "")
 #: Modules whose functions are replaced, each before those that have a function from it.
 MODULES = ("time", "select", "signal", "os", "socket", "threading", "queue", "random", "selectors", "_thread")
+#: Their functions in C, before any is replaced.
+_IN_C = {
+    (module, name): value
+    for module in MODULES
+    for name, value in vars(importlib.import_module(module)).items()
+    if isinstance(value, BuiltinFunctionType)
+}
+
+
+class _Builtin:
+    """A function that shows of itself what a function in C does, and does not become a method in a class.
+
+    Args:
+        function: What a call calls, without a frame in between.
+        original: The function in C, whose attributes it has.
+    """
+
+    # A slot, so that the type finds the function of each object.
+    __slots__ = ("__call__", "__weakref__", "_original")
+
+    def __init__(self, function: Callable[..., Any], original: Any) -> None:
+        self.__call__ = function
+        self._original = original
+
+    def __getattribute__(self, name: str) -> Any:
+        own = object.__getattribute__
+        return own(self, name) if name == "__call__" else getattr(own(self, "_original"), name)
+
+    def __repr__(self) -> str:
+        return repr(object.__getattribute__(self, "_original"))
+
+    def __sizeof__(self) -> int:
+        return int(object.__getattribute__(self, "_original").__sizeof__())
+
+
+_Builtin.__module__, _Builtin.__doc__ = "builtins", BuiltinFunctionType.__doc__
+_Builtin.__name__ = _Builtin.__qualname__ = "builtin_function_or_method"
+
+
+def as_builtin(function: Callable[..., Any], original: Any) -> Any:
+    """Return a function that shows itself as another one, if that is one in C; otherwise it is returned as it is."""
+    return _Builtin(function, original) if isinstance(original, BuiltinFunctionType) else function
 
 
 def _is_own(value: Any) -> bool:
@@ -23,11 +66,22 @@ def _is_own(value: Any) -> bool:
 def rename_functions() -> None:
     """Name each function of this package that another module has as that module's own.
 
-    `multiprocessing` pickles what it calls: a program may hand `time.sleep` to another process.
+    `multiprocessing` pickles what it calls: a program may hand `time.sleep` to another process. A class may have it as
+    an attribute, `pause = time.sleep`, which a function in Python would be a method of.
     """
+    made: dict[tuple[int, int], Any] = {}
     for module in filter(None, map(sys.modules.get, MODULES)):
-        for name, value in vars(module).items():
-            if _is_own(value) and getattr(sys.modules.get(value.__module__), value.__name__, None) is not value:
+        for name, value in list(vars(module).items()):
+            if not _is_own(value):
+                continue
+            original = _IN_C.get((module.__name__, name))
+            if original is not None:
+                shown = made.setdefault((id(value), id(original)), _Builtin(value, original))
+                setattr(module, name, shown)
+                home, called = sys.modules[original.__module__], original.__name__  # such as `posix`
+                if vars(home).get(called) is original:
+                    setattr(home, called, shown)
+            elif getattr(sys.modules.get(value.__module__), value.__name__, None) is not value:
                 value.__module__, value.__name__, value.__qualname__ = module.__name__, name, name
 
 

@@ -922,13 +922,17 @@ def install_own_signals(settle: Callable[[], None]) -> None:
             try:
                 return send(*args)
             finally:
-                if mine(*args) and _rclpy.get_current_signal_handlers_options() in SHUTTING_DOWN.get(args[-1], ()):
+                if (
+                    args
+                    and mine(*args)
+                    and _rclpy.get_current_signal_handlers_options() in SHUTTING_DOWN.get(args[-1], ())
+                ):
                     settle()
 
         setattr(owner, name, sent)
 
-    sending(os, "kill", lambda process, _: process == os.getpid())
-    sending(signal, "raise_signal", lambda _: True)
+    sending(os, "kill", lambda *args: args[0] == os.getpid())
+    sending(signal, "raise_signal", lambda *_: True)
 
 
 def leave_graph(ledger: Ledger) -> None:

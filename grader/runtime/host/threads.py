@@ -4,8 +4,11 @@ Everything in `threading`, `queue` and `concurrent.futures` is built on the plai
 joining it, so replacing these three is enough. A released lock goes to the thread that has waited longest.
 """
 
+import _queue
 import _thread
 import concurrent.futures.thread
+import functools
+import operator
 import queue
 import select
 import selectors
@@ -17,7 +20,7 @@ from typing import Any
 from . import originals
 from .clock import VirtualClock
 from .outside import any_outside
-from .replaced import without_own_frames
+from .replaced import as_builtin, without_own_frames
 from .scheduler import GreenThread, Scheduler
 
 NS_PER_S = 1_000_000_000
@@ -42,7 +45,7 @@ class Timeouts:
         return deadline_ns is not None and self._clock.now_ns >= deadline_ns
 
 
-def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
+def lock_type(scheduler: Scheduler, clock: VirtualClock) -> Any:
     """Create the class that replaces `threading.Lock`."""
     timeouts = Timeouts(clock)
 
@@ -51,15 +54,18 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
 
         __slots__ = ("__weakref__", "_locked", "_waiters")
 
-        def __init__(self) -> None:
+        def __init__(self, *arguments: Any, **named: Any) -> None:
+            if arguments or named:
+                originals.allocate_lock(*arguments, **named)  # raises
             self._locked = False
             self._waiters: deque[GreenThread] = deque()
 
-        def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-            if not blocking and timeout != -1:
-                raise ValueError("can't specify a timeout for a non-blocking call")
-            if timeout < 0 and timeout != -1:
-                raise ValueError("timeout value must be a non-negative number")
+        def acquire(self, *arguments: Any, **named: Any) -> bool:
+            blocking, timeout = True, -1
+            if arguments or named:
+                originals.allocate_lock().acquire(*arguments, **named)  # raises for what it does not take
+                blocking = arguments[0] if arguments else named.get("blocking", True)
+                timeout = arguments[1] if len(arguments) > 1 else named.get("timeout", -1)
             if not self._locked:
                 self._locked = True
                 return True
@@ -121,6 +127,9 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
             """Tell a Condition whether the lock is held; its default, trying to acquire, would count as a look."""
             return self._locked
 
+        def __init_subclass__(cls) -> None:
+            raise TypeError("type '_thread.lock' is not an acceptable base type")
+
         def __reduce_ex__(self, protocol: Any) -> Any:
             raise TypeError("cannot pickle '_thread.lock' object")
 
@@ -139,21 +148,67 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> type:
 
         acquire_lock, release_lock, locked_lock = acquire, release, locked
 
+    VirtualLock.__doc__ = type(originals.allocate_lock()).__doc__
     VirtualLock.__module__, VirtualLock.__name__, VirtualLock.__qualname__ = "_thread", "lock", "lock"
     return VirtualLock
+
+
+def reentrant_lock_type() -> Any:
+    """Create the class that replaces the reentrant lock in C: the one in Python, which shows itself as that does."""
+    in_python: Any = threading._PyRLock  # type: ignore[attr-defined]
+
+    class RLock(in_python):  # type: ignore[misc]
+        def __init__(self, *_: object, **__: object) -> None:
+            super().__init__()
+
+        def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+            return bool(super().acquire(blocking, timeout))
+
+        __enter__ = acquire
+
+        def __repr__(self) -> str:
+            state, owner = "locked" if self._block._is_owned() else "unlocked", self._owner or 0
+            return f"<{state} {_name_of(type(self))} object owner={owner} count={self._count} at {id(self):#x}>"
+
+        def __reduce_ex__(self, protocol: Any) -> Any:
+            raise TypeError(f"cannot pickle '{_name_of(type(self))}' object")
+
+    RLock.__doc__ = _thread.RLock.__doc__
+    RLock.__module__, RLock.__qualname__ = "_thread", "RLock"
+    return RLock
+
+
+def simple_queue_type() -> Any:
+    """Create the class that replaces the simple queue in C: the one in Python, which shows itself as that does."""
+
+    class SimpleQueue(queue._PySimpleQueue):  # type: ignore[name-defined,misc]
+        def __reduce_ex__(self, protocol: Any) -> Any:
+            raise TypeError(f"cannot pickle '{_name_of(type(self))}' object")
+
+    SimpleQueue.__doc__ = queue.SimpleQueue.__doc__
+    SimpleQueue.__module__, SimpleQueue.__qualname__ = "_queue", "SimpleQueue"
+    return SimpleQueue
+
+
+def _name_of(cls: type) -> str:
+    return f"{cls.__module__}.{cls.__qualname__}"
 
 
 def install_locks(scheduler: Scheduler, clock: VirtualClock) -> None:
     """Make every lock that is created from now on virtual."""
     virtual = lock_type(scheduler, clock)
-    threading.Lock = virtual  # type: ignore[assignment]
-    threading._allocate_lock = virtual  # type: ignore[attr-defined]
+    _thread.LockType = virtual  # type: ignore[misc]
+    if hasattr(_thread, "lock"):  # Python 3.13 and later
+        _thread.lock = virtual
+    # A function in C before Python 3.13.
+    made = as_builtin(virtual, originals.allocate_lock)
+    threading.Lock = made if threading.Lock is originals.allocate_lock else virtual
+    _thread.allocate = as_builtin(virtual, _thread.allocate)
+    _thread.allocate_lock = threading._allocate_lock = made  # type: ignore[attr-defined]
     # The reentrant lock and the queue in C block for real; those in Python are built on the plain lock.
-    threading._CRLock = None  # type: ignore[attr-defined]
-    threading.RLock = threading._PyRLock  # type: ignore[attr-defined]
-    _thread.allocate_lock = virtual
-    _thread.RLock = threading._PyRLock  # type: ignore[attr-defined,misc]
-    queue.SimpleQueue = queue._PySimpleQueue  # type: ignore[attr-defined,misc]
+    reentrant = reentrant_lock_type()
+    threading._CRLock = _thread.RLock = reentrant  # type: ignore[attr-defined,misc]
+    queue.SimpleQueue = _queue.SimpleQueue = simple_queue_type()  # type: ignore[misc]
     # Made when the module was imported, before locks were virtual.
     concurrent.futures.thread._global_shutdown_lock = virtual()
 
@@ -197,9 +252,11 @@ def install_threads(
         report: As for `VirtualTime.install`.
     """
 
-    def start_new_thread(function: Callable[..., Any], args: tuple[Any, ...] = (), kwargs: Any = None) -> int:
-        run = scheduler.start(function, tuple(args), kwargs or {})
-        return originals.start_new_thread(run, ())
+    def start_new_thread(*arguments: Any) -> int:
+        function, args, named = (*arguments, {})[:3] if len(arguments) > 1 else (None, (), {})
+        if len(arguments) > 3 or not (callable(function) and isinstance(args, tuple) and isinstance(named, dict)):
+            return originals.start_new_thread(*arguments)  # raises
+        return originals.start_new_thread(scheduler.start(function, args, named), ())
 
     _thread.start_new_thread = start_new_thread
     _thread.start_new = start_new_thread
@@ -218,6 +275,7 @@ def install_threads(
     join_thread = threading.Thread.join
     timeouts = Timeouts(clock)
 
+    @functools.wraps(run_thread)
     def bootstrap_inner(self: threading.Thread) -> None:
         try:
             run_thread(self)
@@ -226,6 +284,7 @@ def install_threads(
             for green_thread in getattr(self, "_grader_joiners", ()):
                 scheduler.wake(green_thread)
 
+    @functools.wraps(join_thread)
     def join(self: threading.Thread, timeout: float | None = None) -> None:
         if self is threading.current_thread() or not self._started.is_set():  # type: ignore[attr-defined]
             join_thread(self, timeout)  # raises as the original does
@@ -245,6 +304,7 @@ def install_threads(
 
     alive = threading.Thread.is_alive
 
+    @functools.wraps(alive)
     def is_alive(self: threading.Thread) -> bool:
         # Its last Python code has run. Python calls it alive until the operating system has ended it too, in real time.
         if getattr(self, "_grader_finished", False):
@@ -289,14 +349,25 @@ def install_selectors(scheduler: Scheduler, clock: VirtualClock, give_up: Callab
 
     for kind in ("SelectSelector", "PollSelector", "EpollSelector"):
         selector = getattr(selectors, kind, None)
-        if selector is not None:
-            _replace_select(selector, virtual)
+        owner = next((cls for cls in getattr(selector, "__mro__", ()) if "select" in vars(cls)), None)
+        if owner is not None:
+            _replace_select(owner, virtual)
 
-    select_now = select.select
+    select_now: Any = select.select
 
-    def virtual_select(read: Any, write: Any, error: Any, timeout: float | None = None, /) -> Any:
-        descriptors = [d if isinstance(d, int) else d.fileno() for d in (*read, *write, *error)]
-        return virtual(lambda: select_now(read, write, error, 0), timeout, lambda ready: not any(ready), descriptors)
+    def virtual_select(*arguments: Any, **named: Any) -> Any:
+        lists: tuple[Any, ...] = arguments[:3]
+        timeout: Any = arguments[3] if len(arguments) == 4 else None
+        if hasattr(type(timeout), "__index__"):
+            timeout = operator.index(timeout)
+        refused = timeout is not None and not (isinstance(timeout, (int, float)) and timeout >= 0)
+        if named or len(lists) < 3 or len(arguments) > 4 or refused:
+            return select_now(*arguments, **named)  # raises
+        try:
+            descriptors = [d if isinstance(d, int) else d.fileno() for listed in lists for d in listed]
+        except Exception:
+            return select_now(*lists, 0)  # raises, or is asked what it makes of it
+        return virtual(lambda: select_now(*lists, 0), timeout, lambda ready: not any(ready), descriptors)
 
     select.select = virtual_select
 
@@ -304,6 +375,7 @@ def install_selectors(scheduler: Scheduler, clock: VirtualClock, give_up: Callab
 def _replace_select(selector: Any, virtual: Callable[..., Any]) -> None:
     select_now = selector.select
 
+    @functools.wraps(select_now)
     def virtual_select(self: Any, timeout: float | None = None) -> Any:
         if timeout is not None and timeout < 0:
             timeout = 0

@@ -43,7 +43,10 @@ def _package(frame: FrameType) -> str:
 def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
     """Make `time.sleep` and the monotonic clocks of the standard library virtual."""
 
-    def sleep(seconds: float | SupportsIndex, /) -> None:
+    def sleep(*arguments: float | SupportsIndex, **named: Any) -> None:
+        if len(arguments) != 1 or named:
+            originals.sleep(*arguments, **named)  # raises
+        seconds = arguments[0]
         if not isinstance(seconds, float) and hasattr(type(seconds), "__index__"):
             seconds = operator.index(seconds)
         if not isinstance(seconds, (int, float)) or not 0 <= seconds <= LONGEST_SLEEP_S:
@@ -56,11 +59,19 @@ def install_sleep_and_clocks(scheduler: Scheduler, clock: VirtualClock) -> None:
         while clock.now_ns < end_ns:
             scheduler.pause(end_ns)
 
+    def steady(original: Callable[[], float], divisor: float | None) -> Callable[[], float]:
+        def now(*arguments: Any, **named: Any) -> float:
+            if arguments or named:
+                original(*arguments, **named)  # raises
+            now_ns = look(clock) - clock.steady_ns
+            return now_ns if divisor is None else now_ns / divisor
+
+        return now
+
     time.sleep = sleep
-    time.monotonic_ns = lambda: look(clock) - clock.steady_ns
-    time.monotonic = lambda: (look(clock) - clock.steady_ns) / NS_PER_S
-    time.perf_counter_ns = lambda: look(clock) - clock.steady_ns
-    time.perf_counter = lambda: (look(clock) - clock.steady_ns) / NS_PER_S
+    for name in ("monotonic", "perf_counter"):
+        setattr(time, name, steady(getattr(time, name), NS_PER_S))
+        setattr(time, f"{name}_ns", steady(getattr(time, f"{name}_ns"), None))
 
     def look_unseen() -> float:
         """Replace the clock in libraries, whose looks do not show how the program paces itself."""
@@ -82,10 +93,17 @@ def install_wall_time(clock: VirtualClock) -> None:
         {"time_ns": lambda self: look(clock), "time": lambda self: look(clock) / NS_PER_S},
     )
     # After time_machine, which expects the original C functions here.
-    get, get_ns = time.clock_gettime, time.clock_gettime_ns
-    steady_ns, steady = time.monotonic_ns, time.monotonic
-    time.clock_gettime_ns = lambda kind, /: steady_ns() if kind in STEADY else get_ns(kind)
-    time.clock_gettime = lambda kind, /: steady() if kind in STEADY else get(kind)
+
+    def read(original: Callable[..., float], steady: Callable[[], float]) -> Callable[..., float]:
+        def get(*kind: Any, **named: Any) -> float:
+            if len(kind) == 1 and not named and isinstance(kind[0], int) and kind[0] in STEADY:
+                return steady()
+            return original(*kind, **named)
+
+        return get
+
+    time.clock_gettime_ns = read(time.clock_gettime_ns, time.monotonic_ns)  # type: ignore[assignment]
+    time.clock_gettime = read(time.clock_gettime, time.monotonic)
 
 
 def install_looks(clock: VirtualClock) -> None:

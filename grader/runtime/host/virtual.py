@@ -12,6 +12,7 @@ from . import originals, threads, times
 from .clock import VirtualClock
 from .link import Link
 from .order import ReadyOrder
+from .replaced import as_builtin
 from .scheduler import GreenThread, Scheduler
 
 if TYPE_CHECKING:
@@ -146,9 +147,9 @@ class VirtualTime:
         """
 
         def noticing(write: Callable[..., Any], ends: Callable[..., bool]) -> Callable[..., Any]:
-            def write_and_note(*args: Any) -> Any:
+            def write_and_note(*args: Any, **named: Any) -> Any:
                 self.unreported = True
-                written = write(*args)
+                written = write(*args, **named)
                 if ends(*args):
                     self.scheduler.wrote()
                 return written
@@ -156,7 +157,8 @@ class VirtualTime:
             return write_and_note
 
         for stream in (sys.stdout, sys.stderr):
-            stream.write = noticing(stream.write, lambda text: text.endswith("\n"))  # type: ignore[method-assign]
+            noted = noticing(stream.write, lambda text: text.endswith("\n"))
+            stream.write = as_builtin(noted, stream.write)  # type: ignore[method-assign]
         ros.replace_log(lambda log: noticing(log, lambda *_: True))
 
     def start(self, now_ns: int, steady_ns: int, *, charged: float = 0.0) -> None:

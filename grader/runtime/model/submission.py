@@ -51,11 +51,22 @@ class CompileError:
 
 
 @dataclass(frozen=True, slots=True)
+class Beginning:
+    """What a Python file starts when it is run, and what it has that can be started in its place."""
+
+    starts: bool = False  # whether a statement at its top level may run the program, as opposed to preparing it
+    main: bool = False  # whether it defines main() at its top level
+    offers_main: bool = False  # whether main() starts it: it needs no arguments, and nothing else starts the module
+    node: str = ""  # its only class of a node, if that can be made without arguments
+
+
+@dataclass(frozen=True, slots=True)
 class ReadProgram:
     """What the contained process found in one Python file of a submission."""
 
     text: SourceText | None = None  # None if it cannot be decoded, or is too long
     inert: bool = False  # whether it holds only comments, texts and `pass`, so that running it does nothing
+    begins: Beginning | None = None  # None if Python cannot parse it
     error: CompileError | None = None
     reaches: tuple[str, ...] = ()  # the names by which it reaches into its process, without duplicates
     told: bool = True  # whether its text is here, if it has any: not all are kept

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import os
 import signal
@@ -11,23 +10,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from grader.runtime.host.packages import ENTRY_POINT, import_folders, layout_of, never_true, start_of
-from grader.runtime.model.limits import MAX_PARSED_BYTES, Limits
+from grader.runtime.host.packages import ENTRY_POINT, import_folders, layout_of, start_of
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.submission import Beginning
 from grader.runtime.model.trace import LogRecord, OutputLine
 from grader.runtime.plan import PlannedStart
 from grader.runtime.sandbox.protocol import Command
 from grader.runtime.worker.console import last_traceback
 from grader.runtime.worker.student_process import NodeProcess
 
-#: Modules whose functions only prepare the program when a file calls them at the top level.
-_SETTING_UP = frozenset({"sys", "os", "warnings", "random", "logging", "np", "numpy", "signal", "math"})
-_NODES = frozenset({"Node", "LifecycleNode"})
-
 
 def bare_arguments(  # noqa: PLR0913  what is known of a file
     here: Path,
     root: str,
     file: str,
+    begins: Beginning | None,
     given: PlannedStart | None = None,
     scripts: Sequence[Sequence[str]] = (),
     *,
@@ -43,6 +40,7 @@ def bare_arguments(  # noqa: PLR0913  what is known of a file
         here: The staged submission.
         root: The path at which the process sees the submission.
         file: The file, relative to `root`.
+        begins: What it starts, as a contained process has read; None if that is not known.
         given: What it is started with; None for its file alone.
         scripts: Name, module and function of each console script of its package.
         installed: Whether the file is installed as it is and run as a script.
@@ -54,11 +52,10 @@ def bare_arguments(  # noqa: PLR0913  what is known of a file
     plain = (*given.arguments, *(("--ros-args", *given.ros_arguments) if given.ros_arguments else ()))
     beside = str(PurePosixPath(path).parent)
     script = f"runpy.run_path({path!r}, run_name='__main__')"
-    tree = _parsed(here / file)
-    if tree is None:
+    if begins is None:
         return _by_import(script, [beside], path, setup, plain) if setup else ("-u", path, *plain)
     layout = layout_of(str(here), file, installed=installed)
-    start = start_of(str(here), file, layout, tree, given.executable, scripts)
+    start = start_of(str(here), file, layout, begins.offers_main, given.executable, scripts)
     own = [str(here / folder) for folder in imported]
     packages = import_folders(str(here), layout.module, layout.base)
     folders = [f for f in dict.fromkeys((start.base, layout.base, *packages, *own)) if f]
@@ -70,7 +67,7 @@ def bare_arguments(  # noqa: PLR0913  what is known of a file
         return _by_import(f"sys.exit({called})" if start.way == ENTRY_POINT else called, seen, path, setup, plain)
     module = start.module or PurePosixPath(file).stem
     seen = seen if start.module else list(dict.fromkeys([beside, *(seen if layout.package is not None else ())]))
-    if run := _help(tree, module):
+    if run := _help(begins, module):
         return _by_import(run, seen, path, setup, plain)
     if start.module:
         return _by_import(
@@ -79,16 +76,15 @@ def bare_arguments(  # noqa: PLR0913  what is known of a file
     return _by_import(script, seen, path, setup, plain) if setup or len(seen) > 1 else ("-u", path, *plain)
 
 
-def _help(tree: ast.Module, module: str) -> str:
+def _help(begins: Beginning, module: str) -> str:
     """Return code that starts a file which starts nothing by itself; empty if that is not needed or not possible."""
-    if any(map(_starts, tree.body)):
+    if begins.starts:
         return ""
-    if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):
+    if begins.main:
         return f"importlib.import_module({module!r}).main()"
-    nodes = [node for node in tree.body if isinstance(node, ast.ClassDef) and _is_node(node)]
-    if len(nodes) != 1 or _needs_arguments(nodes[0]):
+    if not begins.node:
         return ""
-    return f"import rclpy; rclpy.init(); rclpy.spin(importlib.import_module({module!r}).{nodes[0].name}())"
+    return f"import rclpy; rclpy.init(); rclpy.spin(importlib.import_module({module!r}).{begins.node}())"
 
 
 def _with_parameter_files(given: PlannedStart) -> str:
@@ -112,49 +108,6 @@ def _by_import(
     behind = "" if beside in folders else f"; sys.path.append({beside!r})"
     begin = f"import importlib, runpy, sys; sys.path[:1] = {list(folders)!r}; sys.argv[0] = {path!r}{behind}"
     return ("-u", "-c", f"{setup}{begin}; {run}", *arguments)
-
-
-def _parsed(path: Path) -> ast.Module | None:
-    try:
-        content = path.read_bytes()
-        return ast.parse(content) if len(content) <= MAX_PARSED_BYTES else None
-    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
-        return None
-
-
-def _starts(statement: ast.stmt) -> bool:
-    """Return whether a top-level statement may run the program, as opposed to only preparing it."""
-    waiting = [statement]
-    while waiting:  # a long `elif` is as deep as it is long
-        one = waiting.pop()
-        if isinstance(one, ast.Expr):
-            if isinstance(one.value, ast.Call) and _root(one.value.func) not in _SETTING_UP:
-                return True
-        elif isinstance(one, ast.If) and never_true(one):
-            waiting += one.orelse
-        elif not isinstance(one, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
-            waiting += (part for name in ("body", "orelse", "finalbody") for part in getattr(one, name, []))
-    return False
-
-
-def _root(node: ast.expr) -> str:
-    while isinstance(node, (ast.Attribute, ast.Call, ast.Subscript)):
-        node = node.func if isinstance(node, ast.Call) else node.value
-    return node.id if isinstance(node, ast.Name) else ""
-
-
-def _is_node(node: ast.ClassDef) -> bool:
-    return any(getattr(base, "id", getattr(base, "attr", "")) in _NODES for base in node.bases)
-
-
-def _needs_arguments(node: ast.ClassDef) -> bool:
-    """Return whether the constructor has a parameter without a default, apart from `self`."""
-    made = next((f for f in node.body if isinstance(f, ast.FunctionDef) and f.name == "__init__"), None)
-    if made is None:
-        return False
-    given = made.args
-    free = len(given.posonlyargs) + len(given.args) - len(given.defaults)
-    return free > 1 or None in given.kw_defaults
 
 
 #: Name of the sandbox process, which starts the student's.

@@ -108,6 +108,7 @@ class EvaluatedLaunch:
         notes: Sentences about what it left out and does not matter.
         fault: Why nothing can be started; None if something can.
         harness_problem: Why that is not the launch file's fault; empty if it is.
+        written: What it has written, if nothing can be started.
     """
 
     processes: tuple[tuple[str, str], ...] = ()
@@ -119,10 +120,19 @@ class EvaluatedLaunch:
     notes: tuple[str, ...] = ()
     fault: Fault | None = None
     harness_problem: str = ""
+    written: tuple[LogRecord | OutputLine, ...] = ()
 
 
 def evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
     """Wait until a process has evaluated a launch file, and return what it describes."""
+    made = _evaluated(student, plan)
+    if made.fault is None and made.processes:
+        return made
+    student.drain()
+    return replace(made, written=tuple(student.output(0, final=True)))
+
+
+def _evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
     report, why = _description(student)
     if report is None:
         kind = FaultKind.KILLED if student.stopped else FaultKind.HUNG if why else FaultKind.EXITED
@@ -148,7 +158,7 @@ def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
                 return None, student.stopped
             if report.get("kind") == "launched":
                 return report, ""
-        # What it writes is read and dropped, because a full pipe would block it.
+        # What it writes is read, because a full pipe would block it.
         student.drain()
         found = families(list(student.roots))
         # With its children: a launch file may start a program to find something out.
@@ -349,7 +359,8 @@ def expanded(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Plan:
 def unstarted(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Trace:
     """Return the trace of a scenario with a launch file from which nothing can be started."""
     faults = tuple(made.fault for made in launched.values() if made.fault is not None)
-    trace = Trace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=faults)
+    written = tuple(one for made in launched.values() for one in made.written)
+    trace = Trace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=(*written, *faults))
     return renamed(trace, launched)
 
 

@@ -395,6 +395,7 @@ class Worker:
             Path(plan.root),
             root,
             file,
+            dict(plan.begins).get(file),
             start,
             plan.scripts_of(file),
             installed=plan.is_installed(file, start.executable),

@@ -55,6 +55,14 @@ def test_a_page_that_stands_alone_loads_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "assets").exists()
 
 
+@pytest.mark.parametrize(("given", "title"), [("", "in"), ("  ", "in"), ("Robotics 1 <b>", "Robotics 1 &lt;b&gt;")])
+def test_a_page_has_the_title_that_the_instructor_gives(tmp_path: Path, given: str, title: str) -> None:
+    """Else the names of the sources, such as that of a download."""
+    hand_in(tmp_path / "in", ada=10)
+    grade(course(tmp_path / "in", tmp_path / "out", title=given))
+    assert f"<h1>{title}</h1>" in page_of(tmp_path / "out")
+
+
 def test_a_stopped_run_leaves_a_page(tmp_path: Path) -> None:
     """It says so, and who was not graded; the next run says it no more."""
     hand_in(tmp_path / "in", ada=10, bob=7, cleo=5)

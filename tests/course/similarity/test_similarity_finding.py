@@ -14,6 +14,7 @@ from places import ROOT, TESTS
 from sample_folders import folder_of
 from tiers import each
 
+from grader.course.similarity import finding
 from grader.course.similarity.finding import (
     COMMON_LEAST,
     COMMON_MOST,
@@ -98,6 +99,14 @@ def test_code_that_was_handed_out_does_not_count() -> None:
     given = handed("", template).programs
     assert pairs(find_similar([ada, bob], ())) == [("ada", "bob")]
     assert pairs(find_similar([ada, bob], given)) == []
+
+
+@pytest.mark.parametrize("encoding", ["punycode", "idna", "unicode_escape", "nothing"])
+def test_only_encodings_that_take_linear_time_are_decoded(encoding: str) -> None:
+    """Any other text is compared as UTF-8."""
+    written = f"# coding: {encoding}\nname = 'ü-ß'\n"
+    assert finding.text_of(written.encode()) == written
+    assert finding.text_of("# coding: latin-1\nname = 'ü'\n".encode("latin-1")).endswith("name = 'ü'\n")
 
 
 OBVIOUS = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -11,8 +12,12 @@ from nodes import HONEST_FANS, WRONG_FANS, Rule, each_speed, on_change, right_sp
 from tracing import FAN_VALUES, FLOAT32, Recording, held_at, scripted
 
 from grader.grading.model.exercise import Finding
+from grader.grading.rubrics.builtin import builtin_exercises
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.submission import StudentFile, Submission
+from grader.runtime.plan import plan_scenario
+from grader.runtime.stimuli.numbers import PlannedNumbers
 
 ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above", unit="°C")
 OFF = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "at_or_below", unit="°C")
@@ -230,3 +235,17 @@ def test_a_timer_may_be_one_value_late() -> None:
     """It does not answer in the instant in which a value comes."""
     on, off = both(behind(0.6, 0.2))
     assert (on.credit, off.credit) == (1, 1)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_text_is_on_the_wrong_side_of_the_limit_with_every_seed(seed: int) -> None:
+    """Whoever compares texts, however they are formatted, is wrong about one of the temperatures."""
+    file = "fan_controller.py"
+    submission = Submission("ada", "./ada", Path("/staged"), "sha256:aa", {file: StudentFile(file, file)})
+    (exercise,) = (e for e in builtin_exercises() if e.number == "3")
+    (asked,) = (s for s in exercise.scenarios if s.id == "controller_alone")
+    planned = plan_scenario(exercise.id, asked, submission, seed=seed, recordings={}, clock="virtual")
+    values = [value for value, _ in planned.of(PlannedNumbers)[0].numbers]
+    for text in (str, "{:.0f}".format, "{:.1f}".format, "{:.2f}".format):
+        for limit in ("25", "25.0", "25.00"):
+            assert any((text(value) > limit) != (value > 25) for value in values if value != 25)

@@ -334,6 +334,61 @@ def test_a_start_in_new_words_is_known_by_its_call(said: str, line: int, credit:
     assert ("a text such as it writes when it goes on" in finding.reason) == (credit == 0)
 
 
+#: The missions of a client that names one without a common word, and what it writes after a refusal.
+MISSIONS = {84.5: "Exploring", 63.0: "Delivery run"}
+
+
+@pytest.mark.parametrize(
+    ("refused", "lines", "credit"),
+    [
+        ([("INFO", "Patrol")], {"Patrol": 30}, 0),  # ignores success
+        ([("INFO", "charge 12"), ("INFO", "Patrol")], {"Patrol": 30, "charge 12": 29}, 1),  # not what it does else
+        ([("INFO", "Patrol")], {"Patrol": 40}, 1),
+        ([("INFO", "Patrol")], {"Patrol": 30, "hello": 30}, 1),  # a method that logs everything
+        ([("INFO", "Patrol"), ("INFO", "once more")], {"Patrol": 30, "once more": 30}, 1),
+        ([("INFO", "sensor failure")], {"sensor": 30}, 1),  # shows the response
+        ([("WARN", "Patrol is off")], {"Patrol": 30}, 1),
+        ([], {}, 1),
+    ],
+)
+def test_a_start_without_a_common_word_is_known_by_what_the_client_does(
+    refused: Said, lines: dict[str, int], credit: int
+) -> None:
+    """It names another mission each time, by one call and with nothing beside it; so it does after the refusal."""
+    failed = (False, "sensor failure")
+    answers = (battery(84.5), failed, battery(63.0), battery(15.0))
+
+    def write(answer: Answer) -> Said:
+        level = level_of(answer)
+        if answer == failed or level is None:
+            return refused
+        return [("INFO", MISSIONS[level])] if level > 20 else [("WARN", "low")]
+
+    rec = asking(write, answers, header="hello")
+    finding = STILL.judge(at_lines(rec, {"Exploring": 30, "Delivery": 30, **lines}).trace())
+    assert finding.credit == credit, finding.reason
+
+
+@pytest.mark.parametrize("start", ["INFO", "WARN"])
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize(("unknown", "credit"), [("no charge, nothing starts", 1), (None, 1), ("START", 0)])
+def test_whether_a_client_starts_without_a_charge_is_a_question_of_its_own(
+    start: str, swapped: bool, unknown: str | None, credit: int
+) -> None:
+    """A client with its branches the wrong way round, or with a wrong level, may start without a charge or not."""
+    begun, aborted = (start, "mission starts"), ("WARN", "mission is off")
+
+    def write(answer: Answer) -> Said:
+        level = level_of(answer)
+        if level is None:
+            above = aborted if swapped else begun  # what it does above the limit, whatever that is
+            return [above] if unknown == "START" else [("ERROR", unknown)] if unknown else []
+        return [begun if (level > 20) is not swapped else aborted]
+
+    finding = STILL.judge(asking(write, (battery(84.5), FAILED, battery(63.0), battery(15.0))).trace())
+    assert finding.credit == credit, finding.reason
+
+
 def test_a_crash_at_an_unreadable_answer_is_told_and_free() -> None:
     """The client did not go on."""
     answers = (battery(84.5), battery(15.0), UNREADABLE)

@@ -426,6 +426,71 @@ def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(
     assert problem or found.notes == (f"{observing._TOO_BUSY} clock: a.py: it works",)
 
 
+ACTION = """class Count(Node):
+    def execute(self, goal_handle):
+        self.get_logger.info('counting')
+"""
+#: What rclpy prints of that.
+PRINTED = """Traceback (most recent call last):
+  File "/usr/lib/python3/rclpy/action/server.py", line 337, in _execute_goal
+    execute_result = await await_or_execute(execute_callback, goal_handle)
+  File "count.py", line 3, in execute
+    self.get_logger.info('counting')
+AttributeError: 'function' object has no attribute 'info'"""
+
+
+def in_action(text: str, at_s: int = 1) -> LogRecord:
+    """What rclpy logs of an action of count.py."""
+    return LogRecord(at_s * NS_PER_S, "count.py", "ERROR", "count.action_server", text)
+
+
+def test_an_exception_in_an_action_is_told_with_what_to_do() -> None:
+    """It ends no program: rclpy logs and prints it, as often as there are goals."""
+    said = "Error raised in execute callback: 'function' object has no attribute 'info'"
+    goal = "Goal state not set, assuming aborted. Goal ID: [1]"
+    lines = [OutputLine(NS_PER_S, "count.py", "stderr", text) for text in PRINTED.split("\n")]
+    summary = summarise(
+        a_trace(in_action(said), *lines, in_action(goal), in_action(said, 2), *lines, in_action(goal, 2)),
+        ["count.py"],
+        "none",
+        {"count.py": ACTION},
+    )
+    assert [(fault.text, fault.file, fault.line) for fault in summary.faults] == [
+        (PRINTED.rsplit("\n", maxsplit=1)[-1], "count.py", 3)
+    ]
+    assert summary.hints == ("get_logger is a method, call it: self.get_logger().info(...)",)
+    assert not [note for note in summary.notes if "succeed" in note]
+
+
+def test_a_goal_without_a_state_is_told() -> None:
+    """Only rclpy's warning tells it, and names no method."""
+    goal = in_action("Goal state not set, assuming aborted. Goal ID: [1]")
+    (note,) = summarise(a_trace(goal), ["count.py"], "none").notes
+    assert note == "count.py: an action ends without goal_handle.succeed(), so its goal counts as aborted"
+    other = replace(goal, logger="count")
+    assert summarise(a_trace(other), ["count.py"], "none").notes == ()
+
+
+def test_what_only_looks_like_an_exception_in_an_action_is_none() -> None:
+    """Nothing is guessed without the traceback."""
+    said = in_action("Error raised in execute callback: none")
+    assert summarise(a_trace(said), ["count.py"], "none", {"count.py": ACTION}).faults == ()
+
+
+@pytest.mark.ros
+def test_what_a_launch_file_prints_is_shown_with_its_error(tmp_path: Path) -> None:
+    """Whoever prints to find a mistake sees it, also in a line without an end."""
+    text = f"print('at the top')\n{NEEDS}".replace(
+        "def generate_launch_description():\n",
+        "def generate_launch_description():\n    print('here', end='')\n    1 / 0\n",
+    )
+    (tmp_path / "needs.launch.py").write_text(text)
+    request = ObserveRequest((tmp_path / "needs.launch.py",), NS_PER_S, clock="virtual")
+    summary = observe(request, quiet)
+    assert [line.text for line in summary.lines] == ["at the top", "here"]
+    assert "ZeroDivisionError" in summary.faults[0].text
+
+
 @pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize("given", [(), (("kind", "five"),)])

@@ -326,10 +326,14 @@ def test_long_call_chains_are_shortened_in_the_middle() -> None:
 
 
 def test_many_faults_and_notes_are_counted_not_listed() -> None:
-    """A flood of notes does not bury the score, and the rest can be found."""
+    """A flood of notes does not bury the score, and the rest can be found: -v leaves nothing out."""
     text = render(hostile())
-    assert "and 2 more faults; all are in the JSON report" in text
-    assert "and 5 more notes; all are in the JSON report" in text
+    assert "and 2 more faults; -v shows all" in text
+    assert "and 5 more notes; -v shows all" in text
+    whole = render(hostile(), verbose=True)
+    assert "-v shows all" not in whole
+    assert [whole.count(f"note: {number} ") for number in range(25)] == [1] * 25
+    assert whole.count("fault: ") == 12
 
 
 def test_the_report_ends_with_the_command_that_gives_it_again() -> None:

@@ -24,7 +24,7 @@ from grader.grading.submissions.contents import read_contents
 from grader.grading.submissions.program_reader import Described, described, prepare
 from grader.grading.submissions.sources import Programs, read_programs, read_texts
 from grader.runtime.model.limits import MAX_PROGRAM_BYTES
-from grader.runtime.model.submission import ReadProgram, SourceText
+from grader.runtime.model.submission import Beginning, ReadProgram, SourceText
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
 
 #: Calls of functions, for each file and for each node that is examined: the most that any shape takes are 40 and 1,200.
@@ -228,6 +228,31 @@ def test_what_the_process_says_of_programs_is_checked(tmp_path: Path, told: byte
     found, notes = read_programs(tmp_path, (), lambda _: told)
     assert found == {"node.py": ReadProgram(reaches=(LONG_FILE,))}
     assert notes[0].startswith("node.py: not examined")
+
+
+def test_what_a_program_begins_is_told(tmp_path: Path) -> None:
+    """Of a file that Python can parse, however deep or long; nothing else parses it to start it."""
+    (tmp_path / "node.py").write_text("from rclpy.node import Node\nclass Talker(Node): pass\n")
+    (tmp_path / "deep.py").write_text("def main(): pass\nx = 1\nx" + " + 1" * 300 + "\nmain()\n")
+    (tmp_path / "broken.py").write_text("def main(:\n")
+    found, _ = read_programs(tmp_path)
+    assert {path: program.begins for path, program in found.items()} == {
+        "node.py": Beginning(node="Talker"),
+        "deep.py": Beginning(starts=True, main=True),
+        "broken.py": None,
+    }
+
+
+@pytest.mark.parametrize("told", [None, [], [True, True, True], [1, 0, 1, ""], [True, True, True, 4], {"node": "A"}])
+def test_odd_words_on_what_a_program_begins_are_dropped(tmp_path: Path, told: object) -> None:
+    """As if Python could not parse it."""
+    (tmp_path / "node.py").write_text("x = 1\n")
+    row = {"path": "node.py", "reaches": [], "begins": told}
+    found, _ = read_programs(tmp_path, (), lambda _: json.dumps(row).encode() + b"\n")
+    assert found["node.py"].begins is None
+    row["begins"] = [True, False, True, "A(); import os"]
+    found, _ = read_programs(tmp_path, (), lambda _: json.dumps(row).encode() + b"\n")
+    assert found["node.py"].begins == Beginning(starts=True, offers_main=True)
 
 
 def test_odd_values_are_dropped(tmp_path: Path) -> None:

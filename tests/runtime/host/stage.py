@@ -89,6 +89,7 @@ def perform(request: dict[str, Any], pipe: int) -> None:
     stage = Stage(pipe)
     times.install_wall_time(stage.time.clock)
     program.seed_randomness(request["seed"])
+    sys.modules["_grader_host.replaced"].rename_functions()
     stage.time.start(EPOCH_NS, EPOCH_NS - UPTIME_NS)
     try:
         if "file" in request:

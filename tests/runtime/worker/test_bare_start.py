@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from grader.runtime.plan import PlannedStart
-from grader.runtime.worker.bare_start import bare_arguments
+from grader.runtime.programs.beginning import beginning_of
+from grader.runtime.programs.inert import read
+from grader.runtime.worker import bare_start
 
 NODE = "from rclpy.node import Node\nclass Talker(Node): pass\n"
 SCRIPTS = {
@@ -25,6 +28,13 @@ HELPED = {
     "nothing calls main": "import sys\nsys.path.insert(0, 'x')\ndef main(): print('main')",
     "a misspelt guard": "def main(): print('main')\nif __name__ == 'main':\n    main()",
 }
+
+
+def bare_arguments(root: Path, seen: str, file: str, given: PlannedStart | None = None) -> tuple[str, ...]:
+    """How a file is started of which the contained process has read what it begins."""
+    tree = read((root / file).read_bytes())
+    begins = beginning_of(tree) if isinstance(tree, ast.Module) else None
+    return bare_start.bare_arguments(root, seen, file, begins, given)
 
 
 @pytest.mark.parametrize("text", SCRIPTS.values(), ids=SCRIPTS)

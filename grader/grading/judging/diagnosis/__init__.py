@@ -12,6 +12,7 @@ from grader.grading.judging.diagnosis import (
     attributes,
     callbacks,
     crashes,
+    launch_mistakes,
     loading,
     logs,
     misuse,
@@ -35,6 +36,7 @@ from grader.runtime.model.trace import Fault, Trace, main_not_called, same_node_
 
 #: Modules of rules; each rule says itself where it stands among all.
 _MODULES = (
+    launch_mistakes,
     loading,
     scopes,
     services,

@@ -64,6 +64,8 @@ class Case:
     others: tuple[Criterion, ...] = ()
     facts: Any = None
     lost: Mapping[str, Criterion] = field(default_factory=dict)
+    #: What rules have computed from it, by the function that did: many rules ask for the same.
+    known: dict[object, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     @property
     def check(self) -> Any:
@@ -244,7 +246,9 @@ def hint_rule(
 
     def make(find: Callable[[Given], Clue | None]) -> Rule:
         def found(case: Case) -> Clue | None:
-            known = given(case)
+            if given not in case.known:
+                case.known[given] = given(case)
+            known: Given | None = case.known[given]
             return None if known is None else find(known)
 
         about = (find.__doc__ or "").strip().split("\n")[0]

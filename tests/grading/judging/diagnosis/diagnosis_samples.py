@@ -423,3 +423,91 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "unanswered": ("client_waits", unanswered),
     "greeting": ("defaults", greeting),
 }
+
+#: A line of a launch file, its error, the hint, and the rule that gives it.
+LAUNCH_SLIPS = [
+    (
+        "from launch.substitutions import LaunchConfigurtion",
+        "ImportError: cannot import name 'LaunchConfigurtion' from 'launch.substitutions' (unknown location)",
+        "from launch.substitutions import LaunchConfiguration, not LaunchConfigurtion",
+        "launch_import",
+    ),
+    (
+        "from launch import Node",
+        "ImportError: cannot import name 'Node' from 'launch' (unknown location)",
+        "Node is in another module: from launch_ros.actions import Node",
+        "launch_import",
+    ),
+    (
+        "from launch import DeclareLaunchArgumnt",
+        "ImportError: cannot import name 'DeclareLaunchArgumnt' from 'launch' (unknown location)",
+        "there is no DeclareLaunchArgumnt: from launch.actions import DeclareLaunchArgument",
+        "launch_import",
+    ),
+    (
+        "from ament_index_python.packages import get_package_share_dir",
+        "ImportError: cannot import name 'get_package_share_dir' from 'ament_index_python.packages' (unknown location)",
+        "from ament_index_python.packages import get_package_share_directory, not get_package_share_dir",
+        "launch_import",
+    ),
+    (
+        "import launch",
+        "AttributeError: module 'launch' has no attribute 'LaunchDescripton'",
+        "launch.LaunchDescripton should be launch.LaunchDescription",
+        "launch_attribute",
+    ),
+    (
+        "import launch_ros",
+        "AttributeError: module 'launch_ros' has no attribute 'action'",
+        "launch_ros.action should be launch_ros.actions",
+        "launch_attribute",
+    ),
+    (
+        "import launch",
+        "AttributeError: module 'launch' has no attribute 'TimerAction'",
+        "TimerAction is in another module: from launch.actions import TimerAction",
+        "launch_attribute",
+    ),
+    (
+        "import launch.condition",
+        "ModuleNotFoundError: No module named 'launch.conditon'",
+        "the module is called launch.conditions, not launch.conditon",
+        "launch_module",
+    ),
+    (
+        "x = LaunchDescription()",
+        "NameError: name 'LaunchDescription' is not defined",
+        "the import is missing: from launch import LaunchDescription",
+        "launch_name",
+    ),
+    (
+        "x = Node(package='a', executable='b')",
+        "NameError: name 'Node' is not defined",
+        "the import is missing: from launch_ros.actions import Node",
+        "launch_name",
+    ),
+    (
+        "from launch.actions import GroupAction\nx = GroupActon()",
+        "NameError: name 'GroupActon' is not defined",
+        "GroupActon should be GroupAction",
+        "launch_name",
+    ),
+    (
+        "x = Node(package='a', executible='b')",
+        "TypeError: Node.__init__() missing a required argument: 'executable'",
+        "write executable=, not executible=",
+        "launch_argument",
+    ),
+    (
+        "x = Node(package='a')",
+        "TypeError: Node.__init__() missing a required argument: 'executable'",
+        "give Node its executable: Node(executable=...)",
+        "launch_argument",
+    ),
+    (
+        "x = DeclareLaunchArgument('a', defualt_value='b')",
+        "TypeError: DeclareLaunchArgument.__init__() got an unexpected keyword argument 'defualt_value'",
+        "write default_value=, not defualt_value=",
+        "launch_argument",
+    ),
+]

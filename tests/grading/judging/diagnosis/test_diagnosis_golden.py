@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from archive import recordings
 from diagnosis_samples import (
+    LAUNCH_SLIPS,
     RECORDINGS,
     RIGHT,
     crashed,
@@ -171,6 +172,7 @@ def test_every_rule_is_shown_to_work() -> None:
     recorded = [json.loads(one.report)["exercises"] for one in recordings().values()]
     verdicts = [verdict for exercises in recorded for exercise in exercises for verdict in exercise["criteria"]]
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
+    shown |= {cause for _, _, _, cause in LAUNCH_SLIPS}
     # it only names another criterion, so that reports do not name it
     shown |= {"follows" for v in verdicts if v.get("same_cause_as") and CAUSE_KEY not in v["evidence"]}
     assert {rule.id for rule in EVERY} - shown == set()
