@@ -34,7 +34,7 @@ def test_only_growth_by_more_than_a_fifth_is_warned_of(
     assert runpy.run_path(str(BENCHMARKS / "speed.py"))["warnings"](now, before) == grown
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 @pytest.mark.skipif(shutil.which("perf") is None, reason="perf is not installed")
 def test_virtual_seconds_are_those_of_all_recordings(monkeypatch: pytest.MonkeyPatch) -> None:

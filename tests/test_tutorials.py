@@ -52,9 +52,9 @@ def run(command: str, folder: Path) -> str:
     return " ".join(done.stdout.split())
 
 
+@pytest.mark.nightly
 @pytest.mark.breadth(0, 1)
 @pytest.mark.ros
-@pytest.mark.long
 @pytest.mark.parametrize("series", SERIES)
 def test_the_tutorials_work(series: str, tmp_path: Path) -> None:
     """Every file as it stands in them, every command in order, and every line that it is said to print."""

@@ -13,6 +13,7 @@ PAGES = {"docs/tutorials/first-test.md": (1 + 2 + 5, 4), "docs/how-to/launch-tes
 pytestmark = pytest.mark.ros
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("page", each(PAGES, 2))
 def test_what_a_page_shows_works(pytester: pytest.Pytester, page: str) -> None:

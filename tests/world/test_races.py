@@ -254,6 +254,7 @@ def logs_of(ros_session: Worlds, folder: Path, seed: int, *programs: str) -> lis
         return [f"{log.t_ns} {log.text}" for log in first.logs]
 
 
+@pytest.mark.breadth(0, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("spin", [*more([TAIL]), MANY], ids=["one thread", "four threads"])
 def test_a_drawn_order_is_one_that_messages_can_have(ros_session: Worlds, tmp_path: Path, spin: str) -> None:

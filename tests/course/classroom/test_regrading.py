@@ -210,8 +210,8 @@ def test_only_the_same_recording_is_used(folder: Path) -> None:
     assert recorded_alike(evidence, [other], PlannedRun(digest, seed, "")) == ()
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 def test_only_the_changed_exercise_of_a_submission_runs(tmp_path: Path) -> None:
     """Its other recordings are used as they are, and the report is that of a whole run."""
     for number in (1, 2):

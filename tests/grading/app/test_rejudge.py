@@ -169,7 +169,7 @@ def test_reports_of_a_class_are_files_in_a_folder(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_many_processes_give_what_one_gives(tmp_path: Path) -> None:
     """In the same order; enough submissions for a pool."""

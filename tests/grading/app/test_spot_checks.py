@@ -377,7 +377,7 @@ def told_of(tmp_path: Path, seed: int) -> tuple[int, int, str]:
     return int(date), int(uptime), order
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_the_date_and_the_hashes_follow_from_the_seed(tmp_path: Path) -> None:
     """So no program knows them, and the same file gets the same report on every day."""

@@ -215,7 +215,7 @@ def test_what_asks_for_no_other_format_reads_no_metadata(package: Path) -> None:
     assert done.stdout.splitlines()[-1] == "False"
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.ros
 def test_the_package_of_the_page_works(tmp_path: Path) -> None:

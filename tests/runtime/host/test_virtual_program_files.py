@@ -33,7 +33,7 @@ GOLDEN = PROGRAMS / "told.json"
 NAMES = sorted(path.stem for path in PROGRAMS.glob("*.py") if path != PARTNER)
 #: One in so many runs by default, and those for which a host has to do something of its own.
 SHARE = 31
-ALWAYS = ("clock_of_the_node_jumps", "graph_counts", "lifecycle_fails")
+ALWAYS = ("clock_of_the_node_jumps", "graph_counts", "graph_of_actions", "lifecycle_fails")
 
 
 def marks(number: int, name: str) -> list[Any]:
@@ -53,7 +53,7 @@ def told_on(clock: str, trace: Trace) -> Told:
     return told(trace)
 
 
-@pytest.mark.breadth(4, 20)
+@pytest.mark.breadth(8, 20)
 @rows_of(plan)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(n, name)) for n, name in enumerate(NAMES)])
 def test_what_a_program_does_in_virtual_time(trace: Trace, name: str) -> None:

@@ -186,8 +186,8 @@ executor.shutdown()
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 def test_threads_that_publish_take_and_call_at_once_do_not_block_each_other(built: BuiltInterfaces) -> None:
     assert run(THREADS, built).split() == ["160", "True"]
 

@@ -152,7 +152,7 @@ def test_no_kind_is_derived_from_another() -> None:
     assert [(a, b) for a in KINDS for b in KINDS if a is not b and issubclass(a, b)] == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_a_kind_is_one_module_and_its_row(tmp_path: Path) -> None:
     """In a copy of the package: read from a rubric, drawn, sent to a worker, checked, played, judged and explained."""

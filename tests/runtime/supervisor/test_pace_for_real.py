@@ -162,8 +162,8 @@ def of_each(programs: dict[str, str]) -> list[object]:
     return [pytest.param(program, id=name, marks=marks[name]) for name, program in programs.items()]
 
 
+@pytest.mark.nightly
 @pytest.mark.breadth(0, 1)
-@pytest.mark.long
 @pytest.mark.parametrize("program", of_each(RELATIVE))
 def test_a_loop_that_pauses_after_its_work_is_as_slow_as_it_is(run: Record, program: str) -> None:
     """20 ms of work and a pause of 50: 14 Hz, by the wall clock, or by the measured work if the machine is too busy."""
@@ -202,7 +202,7 @@ def test_a_recording_in_virtual_time_is_the_same_each_time(run: Record) -> None:
     assert len({(s["sec"], s["nanosec"]) for s in stamps}) == len(stamps) > 90
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.rule(23)
 def test_time_passes_while_a_program_works_where_it_is_charged(run: Record) -> None:
     """The recording that decides: what a program publishes after its work comes later, and so does its next pause.

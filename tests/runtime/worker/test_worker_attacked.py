@@ -484,7 +484,7 @@ def test_a_worker_that_is_always_killed_decides_nothing(tmp_path: Path) -> None:
     assert trace.observations == ()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_scenarios_leave_no_descriptor_and_no_process(tmp_path: Path) -> None:
     """After ten more, this process and its worker hold what they held before."""
     tmp_path.chmod(0o755)

@@ -104,6 +104,7 @@ def test_shared_files_beside_the_report_draw_the_same(visit: Open, tmp_path: Pat
     assert {url.rsplit("/", 1)[1] for url in asked} == {"report.html", *bundle().files}
 
 
+@pytest.mark.breadth(1, 0)
 @pytest.mark.parametrize("text", each(ATTACKS, len(ATTACKS)))
 def test_hostile_text_stays_text_wherever_it_is_shown(visit: Open, text: str) -> None:
     """In the page, in tooltips, in tables, in the legend and inside the charts."""
@@ -420,7 +421,7 @@ def test_a_slider_shows_each_moment_of_the_run(visit: Open) -> None:
     assert said == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_run_plays_until_it_is_paused_and_from_the_start_after_its_end(visit: Open) -> None:
     """With the pointer, and with the space bar on the slider; arrow keys move it."""
     page, said, _ = visit(render_html(graded.perfect()))

@@ -135,7 +135,7 @@ def says(texts: list[str], logged: list[str], clock: str) -> bool:
     return late_enough and [TIME.sub("", t) for t in texts[: len(logged)]] == [TIME.sub("", t) for t in logged]
 
 
-@pytest.mark.breadth(0, 2)
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize(("text", "logged"), but([PLOTTING["a window stays open"]], PLOTTING.values()), ids=PLOTTING)
 def test_a_program_that_plots(text: str, logged: list[str], clock: str, tmp_path: Path) -> None:
