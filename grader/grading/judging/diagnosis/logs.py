@@ -14,6 +14,7 @@ from grader.grading.judging.diagnosis.wiring import (
     is_log,
     made,
     made_for,
+    message_of,
     names_in,
     number_in_code,
     pauses,
@@ -338,26 +339,27 @@ def _received_not_logged(case: Case) -> Clue | None:
     if item is None or not start or facts is None or not facts.missing:
         return None
     inside = list(reached(source, start))
+    received_as = f"{message_of(source, item)}.data"
     logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
     if len(logs) == 1:
-        return _wrong_log(source, logs[0], inside)
+        return _wrong_log(source, logs[0], inside, received_as)
     elsewhere = any(is_log(source, n) and _shows(n, _stored(inside)) for n in source.all(ast.Call))
     if logs or elsewhere or case.verdict.outcome is not Outcome.NOT_MET:
         return None
     name = last_name(item.callback) or "the callback"
-    return Clue(f"{name} receives the values but does not log them: log msg.data in it", source.place(start[0]))
+    return Clue(f"{name} receives the values but does not log them: log {received_as} in it", source.place(start[0]))
 
 
-def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | None:
+def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST], received_as: str) -> Clue | None:
     """Return a clue if a log shows no value, or only attributes unrelated to the message."""
     names = [n for a in log.args for n in _inner(a) if isinstance(n, (ast.Name, ast.Attribute))]
     if not names:
-        return Clue("this log contains no value: log what was received, msg.data", source.place(log))
+        return Clue(f"this log contains no value: log what was received, {received_as}", source.place(log))
     whole = [n for n in names if not isinstance(source.parents.get(n), ast.Attribute)]
     own = [chain(n) for n in whole if chain(n).startswith("self.")]
     if len(own) < len(whole) or set(own) & _stored(inside):
         return None
-    return Clue(f"{source.code(log, 60)} does not show what was received: log msg.data", source.place(log))
+    return Clue(f"{source.code(log, 60)} does not show what was received: log {received_as}", source.place(log))
 
 
 #: Functions that convert an angle to radians.
@@ -366,6 +368,10 @@ _TO_RADIANS = ("radians", "deg2rad")
 _DEEPEST_FACTOR = 12
 #: A factor beyond this makes degrees of radians.
 _DEGREES = 50.0
+#: Pi with four decimals, 3.1416, is as exact as this; with two, it is not, and a log with two decimals shows it.
+_EXACT = 1e-5
+#: A factor as near as this, such as 180 / 3.14 or 57, is meant to be the right one.
+_NEARLY = 0.06
 
 
 @hint_rule("logs_values", outcome=Outcome.NOT_MET, problem=ProblemKind.WRONG_VALUE, priority=11140)
@@ -382,8 +388,8 @@ def _converted_wrongly(case: Case) -> Clue | None:
     scaled = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, (ast.Mult, ast.Div))]
     whole = [n for n in scaled if source.parents.get(n) not in scaled]
     wrong = [n for n in whole if _factor(source, n) not in (None, 1.0) and not _is_degrees(_factor(source, n))]
-    if len(wrong) == 1 and wants_degrees and advice:
-        return Clue(advice, source.place(wrong[0]))
+    if len(wrong) == 1 and wants_degrees:
+        return _wrong_factor(source, wrong[0])
     logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
     return Clue(advice, source.place(logs[0])) if len(logs) == 1 and advice else None
 
@@ -399,8 +405,23 @@ def _factor(source: Source, node: ast.AST, depth: int = 0) -> float | None:
     return left * right if isinstance(node.op, ast.Mult) else left / right if right else None
 
 
+def _wrong_factor(source: Source, node: ast.BinOp) -> Clue:
+    """Return the clue for a product or quotient that should make degrees of radians."""
+    factor = _factor(source, node) or 0.0
+    near = math.isclose(abs(factor), math.degrees(1.0), rel_tol=_NEARLY)
+    does = "is not exact enough" if near else "does not make degrees of radians"
+    return Clue(f"{source.code(node, 50)} {does}: write math.degrees({_converted(source, node)})", source.place(node))
+
+
+def _converted(source: Source, node: ast.expr) -> str:
+    """Return the code of the only unknown part of a product or quotient."""
+    while isinstance(node, ast.BinOp):
+        node = node.right if number_in_code(source, node.left) is not None else node.left
+    return source.code(node, 40)
+
+
 def _is_degrees(factor: float | None) -> bool:
-    return factor is not None and math.isclose(factor, math.degrees(1.0), rel_tol=1e-3)
+    return factor is not None and math.isclose(factor, math.degrees(1.0), rel_tol=_EXACT)
 
 
 def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:

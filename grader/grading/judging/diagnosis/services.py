@@ -14,6 +14,7 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     short,
+    spin_for,
     target_of,
     text_in_code,
 )
@@ -141,7 +142,7 @@ def _synchronous_call(case: Case) -> Clue | None:
             return Clue(f"{hint}: use call_async and add_done_callback", source.place(call), key="waits_in_callback")
         if not names & {*_THREADS, "MultiThreadedExecutor"}:
             hint = f"{code} waits forever: nothing spins the node meanwhile; use call_async, "
-            return Clue(f"{hint}then rclpy.spin_until_future_complete(node, future)", source.place(call), key="unspun")
+            return Clue(f"{hint}then {spin_for(source, call)}", source.place(call), key="unspun")
     return None
 
 
@@ -170,7 +171,7 @@ def _future_never_done(case: Case) -> Clue | None:
         inside = names_called(source, [loop])
         if asks and not inside & set(SPINS):
             hint = f"'while {source.code(loop.test, 40)}' never ends: a response is taken only while the node spins; "
-            return Clue(f"{hint}use rclpy.spin_until_future_complete(node, future)", source.place(loop))
+            return Clue(f"{hint}use {spin_for(source, loop)}", source.place(loop))
     return None
 
 
@@ -211,8 +212,13 @@ def _too_early(source: Source) -> Clue | None:
     found = _unawaited(source)
     if found is None:
         return None
+    owner = chain(found.func.value) if isinstance(found, ast.Call) and isinstance(found.func, ast.Attribute) else ""
+    future = owner if owner and "(" not in owner else "future"
     hint = f"{source.code(found)} is read before the response has arrived, so it is None: "
-    hint += "first call rclpy.spin_until_future_complete(node, future)"
+    if found in callback_nodes(source):
+        hint += f"read it in a function given to {future}.add_done_callback"
+    else:
+        hint += f"first call {spin_for(source, found, future)}"
     return Clue(hint, source.place(found), key="result_too_early")
 
 
@@ -248,7 +254,9 @@ def _future_is_no_answer(crash: Crash) -> Clue | None:
             code = source.code(call, 50)
             return Clue(f"call_async returns a future: write await {code} to get the response", source.place(call))
     hint = f"call_async returns a future, and {name} is in the response: call "
-    return Clue(f"{hint}rclpy.spin_until_future_complete(node, future), then future.result().{name}")
+    used = next(source.on_line(crash.line, ast.Attribute), next(source.calls("call_async")))
+    spin = spin_for(source, used)
+    return Clue(f"{hint}{spin}, then future.result().{name}")
 
 
 @crash_rule(
