@@ -6,9 +6,10 @@ import ast
 import math
 import re
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call
+from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call, silent_topic
 from grader.grading.judging.diagnosis.wiring import (
     Made,
+    conditions,
     constant,
     is_flag,
     is_log,
@@ -22,7 +23,10 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     runs,
+    switches,
+    target_of,
     timer_code,
+    value_of,
 )
 from grader.grading.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import printed_lines, student_records
@@ -259,6 +263,84 @@ def _set_inside(test: ast.If) -> bool:
     return any(chain(t) in names_in(test.test) for t in stored)
 
 
+@hint_rule(priority=11085)
+def _timer_set_back(case: Case) -> Clue | None:
+    """The callback of a subscription starts the only timer anew with each message, or stops it."""
+    source, timers = case.source, made(case.source, "timer")
+    rare = case.found(LogPaceFacts) is not None or case.found(WrongLogFacts) is not None or bool(silent_topic(case))
+    name = target_of(source, timers[0].call) if len(timers) == 1 else ""
+    if not rare or not name:
+        return None
+    timed = runs(source, timers[0])
+    for item in made(source, "subscription"):
+        for node in runs(source, item):
+            called = node.func if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) else None
+            if called is None or chain(called.value) != name or called.attr not in ("reset", "cancel") or node in timed:
+                continue
+            does = "starts the timer anew with" if called.attr == "reset" else "stops the timer after"
+            hint = f"{source.code(node, 40)} {does} each message, so that it never fires: remove it"
+            return Clue(hint, source.place(node), key="log_pace")
+    return None
+
+
+#: What one of it is, in seconds -> how it is called.
+_UNITS = {1e-9: "nanoseconds", 1e-6: "microseconds", 1e-3: "milliseconds", 1.0: "seconds"}
+_IN_NANOSECONDS = ("time_ns", "monotonic_ns", "perf_counter_ns")
+_IN_SECONDS = ("time.time", "time.monotonic", "time.perf_counter")
+#: How many names and operators of a time are followed.
+_DEEPEST_TIME = 8
+
+
+@hint_rule(priority=11095)
+def _time_in_another_unit(case: Case) -> Clue | None:
+    """A log waits for a time that is compared in nanoseconds or milliseconds with a number of seconds."""
+    pace, call = case.found(LogPaceFacts), log_call(case)
+    if call is None or pace is None:
+        return None
+    source, tests = case.source, {n for test in conditions(case.source, call) for n in ast.walk(test.test)}
+    for switch in switches(source):
+        unit = _unit_s(source, switch.tested) if switch.node in tests else None
+        waited_s = switch.limit.value * unit if unit is not None else pace.wanted_s
+        # within the tolerance of what is asked, or the other way round: other rules
+        if unit is None or 0.5 < waited_s / pace.wanted_s < 2 or (waited_s < pace.wanted_s) != (pace.count > 2):
+            continue
+        named = next((name for size, name in _UNITS.items() if math.isclose(size, unit)), "")
+        if not named:
+            continue
+        exact, power = pace.wanted_s / unit, round(math.log10(1 / unit))
+        right = f"{number(pace.wanted_s)} * 1e{power}" if power > 3 and pace.wanted_s != 1 else f"1e{power}"
+        right = right if power > 3 else number(exact)
+        hint = f"'{source.code(switch.node, 50)}' compares {named}: write {right} for {number(pace.wanted_s)} s"
+        return Clue(hint, source.place(switch.limit.origin), key="log_pace")
+    return None
+
+
+def _unit_s(source: Source, node: ast.AST | None, depth: int = 0) -> float | None:
+    """Return how many seconds one unit of a time is, as far as the text shows it."""
+    if node is None or depth > _DEEPEST_TIME:
+        return None
+    if isinstance(node, ast.BinOp):
+        return _unit_of_pair(source, node, depth)
+    called = node.func if isinstance(node, ast.Call) else None
+    if last_name(called) in _IN_NANOSECONDS or (isinstance(node, ast.Attribute) and node.attr == "nanoseconds"):
+        return 1e-9
+    if called is not None:
+        return 1.0 if source.resolved(called) in _IN_SECONDS else None
+    value = value_of(source, node)
+    return None if value is node else _unit_s(source, value, depth + 1)
+
+
+def _unit_of_pair(source: Source, node: ast.BinOp, depth: int) -> float | None:
+    """Return the unit of a difference of times, or of one that is multiplied or divided by a number."""
+    left, right = _unit_s(source, node.left, depth + 1), _unit_s(source, node.right, depth + 1)
+    if isinstance(node.op, ast.Sub):
+        return left if left is not None else right
+    by = number_in_code(source, node.right)
+    if left is None or not by or not isinstance(node.op, (ast.Mult, ast.Div, ast.FloorDiv)):
+        return None
+    return left / by if isinstance(node.op, ast.Mult) else left * by
+
+
 @hint_rule(priority=11100)
 def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback sets the wrong pace."""
@@ -267,9 +349,11 @@ def _log_period(case: Case) -> Clue | None:
         return None
     source, wanted_s, average = case.source, pace.wanted_s, pace.average_s
     worth = constant(source, argument(call, 99, "throttle_duration_sec"))
-    if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
+    rare = pace.count <= 2 and worth is not None and worth.value > 2 * wanted_s
+    if worth is not None and (rare or 0.8 * worth.value <= average <= 1.3 * worth.value):
         hint = f"throttle_duration_sec={number(worth.value)} allows a log every {number(worth.value)} s"
-        return Clue(f"{hint}: write {wanted_s}", source.place(worth.origin), key="log_pace")
+        unit = ", because it is in seconds" if rare else ""
+        return Clue(f"{hint}: write {wanted_s}{unit}", source.place(worth.origin), key="log_pace")
     timers = [m for m in made(source, "timer") if call in runs(source, m)]
     if timers:
         return _timer_pace(source, timers, average, wanted_s) if len(timers) == 1 else None

@@ -10,6 +10,7 @@ from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, lines_
 from grader.grading.judging.diagnosis.wiring import (
     Constant,
     Made,
+    callback_nodes,
     called_only,
     changes,
     conditions,
@@ -18,6 +19,7 @@ from grader.grading.judging.diagnosis.wiring import (
     made,
     made_for,
     names_called,
+    number_in_code,
     pauses,
     publish_calls,
     reached,
@@ -25,9 +27,10 @@ from grader.grading.judging.diagnosis.wiring import (
     runs,
     spin_timeout,
     timer_code,
+    value_of,
     waits_for_ever,
 )
-from grader.grading.judging.facts import RateFacts
+from grader.grading.judging.facts import LogPaceFacts, RateFacts
 from grader.grading.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import number
@@ -74,6 +77,25 @@ def _same(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=_SAME)
 
 
+@hint_rule(priority=9005)
+def _timer_made_again(case: Case) -> Clue | None:
+    """A callback creates a timer each time it runs, and none is stopped."""
+    rate, pace = case.found(RateFacts), case.found(LogPaceFacts)
+    often = rate is not None and (
+        rate.rate_hz > getattr(case.check, "rate", math.inf) or case.is_about(ProblemKind.BURSTS)
+    )
+    if not (often or (pace is not None and 0 < pace.average_s < pace.wanted_s)):
+        return None
+    source, inside = case.source, callback_nodes(case.source)
+    stopped = any(source.calls("cancel", "destroy_timer", "destroy"))
+    again = [m.call for m in made(source, "timer") if m.call in inside and not conditions(source, m.call)]
+    if stopped or not again:
+        return None
+    name = source.function_name(again[0]) or "the callback"
+    hint = f"{name} creates another timer each time it runs: create the timer once, in __init__"
+    return Clue(hint, source.place(again[0]))
+
+
 @hint_rule("topic_rate", given=_paced, priority=9010)
 def _period(paced: _Paced) -> Clue | None:
     """The period of the timer explains the rate."""
@@ -84,14 +106,30 @@ def _period(paced: _Paced) -> Clue | None:
     if worth is None or _same(worth.value, paced.period_s):
         return None
     if worth.value == 0:
-        code = timer_code(paced.source, timers[0])
-        why = "; // rounds down to an integer, / does not" if "//" in code else ""
-        hint = f"{code} has a period of 0 s: write {number(paced.period_s)}{why}"
-        return Clue(hint, paced.source.place(worth.origin))
+        hint = f"{timer_code(paced.source, timers[0])} has a period of 0 s: write {number(paced.period_s)}"
+        return _rounded_down(paced, timers[0]) or Clue(hint, paced.source.place(worth.origin))
     explains = _same(1 / worth.value, paced.found_hz) or (
         paced.facts.count <= 2 and _same(worth.value, paced.facts.first_s)
     )
     return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
+
+
+def _rounded_down(paced: _Paced, timer: Made) -> Clue | None:
+    """Return a clue if an integer division, or `int`, makes 0 of the right period."""
+    source, value = paced.source, value_of(paced.source, timer.period)
+    for node in ast.walk(value) if value is not None else ():
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.FloorDiv):
+            ends = [number_in_code(source, side) for side in (node.left, node.right)]
+            right, why = f"{source.code(node.left, 30)} / {source.code(node.right, 30)}", "// rounds down"
+            period = ends[0] / ends[1] if ends[0] is not None and ends[1] else 0.0
+        elif isinstance(node, ast.Call) and chain(node.func) in ("int", "round") and len(node.args) == 1:
+            right, why = source.code(node.args[0], 40), f"{chain(node.func)} makes an integer of it"
+            period = number_in_code(source, node.args[0]) or 0.0
+        else:
+            continue
+        better = right if _same(period, paced.period_s) else number(paced.period_s)
+        return Clue(f"{source.code(node, 40)} is 0, because {why}: write {better}", source.place(node))
+    return None
 
 
 def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float) -> Clue:
