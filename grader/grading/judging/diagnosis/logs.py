@@ -499,9 +499,13 @@ def _wrong_factor(source: Source, node: ast.BinOp) -> Clue:
 
 def _converted(source: Source, node: ast.expr) -> str:
     """Return the code of the only unknown part of a product or quotient."""
-    while isinstance(node, ast.BinOp):
-        node = node.right if number_in_code(source, node.left) is not None else node.left
-    return source.code(node, 40)
+    while True:
+        if isinstance(node, ast.BinOp):
+            node = node.right if number_in_code(source, node.left) is not None else node.left
+        elif isinstance(node, ast.Call) and chain(node.func) in ("int", "round", "float") and node.args:
+            node = node.args[0]
+        else:
+            return source.code(node, 40)
 
 
 def _is_degrees(factor: float | None) -> bool:
