@@ -700,6 +700,10 @@ def _no_number(crash: Crash) -> Clue | None:
                 return Clue(f"{code} takes only integers: write float({source.code(call.args[0], 30)})")
             if re.fullmatch(r"-?\d+,\d+", found):
                 return Clue("Python has no decimal comma: write 0.5 instead of 0,5")
+            unit = re.fullmatch(r"\s*-?\d+(?:\.\d+)?\s*([%°A-Za-z]{1,3})\s*", found)
+            if unit is not None and asked == "float":
+                right = f"float({source.code(call.args[0], 30)}.rstrip('{unit[1]}'))"
+                return Clue(f"the string ends with {unit[1]}, so it is no number: write {right}")
             return Clue(f"{code} needs a string that holds only a number: extract the number first")
     return None
 

@@ -459,7 +459,9 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
             continue
         code = source.code(call)
         if function.name == "__init__":
-            hint = f"{code} in the constructor does not return: nothing after it runs"
+            elsewhere = any(last_name(n) == last_name(call.func) and n is not call.func for n in spins(source))
+            advice = "remove it" if elsewhere else "call it in main, once the node is made"
+            hint = f"{code} in the constructor does not return, so nothing after it runs: {advice}"
             return Clue(hint, source.place(call), key="nested_spin")
         if any(call in runs(source, m) for m in made(source, "timer", "subscription")):
             hint = f"{code} inside a callback waits for something that can only arrive after the callback returns"

@@ -321,6 +321,13 @@ def _wrong_number(wrong: _Wrong) -> Clue | None:
     return None
 
 
+def _converted_already(source: Source, value: ast.expr, want: float) -> str | None:
+    """Return the code of the right number that is converted to radians; None if there is none."""
+    calls = (n for n in ast.walk(value) if isinstance(n, ast.Call) and len(n.args) == 1)
+    given = (c.args[0] for c in calls if last_name(c.func) in _TO_RADIANS)
+    return next((source.code(a, 30) for a in given if _is(number_in_code(source, a) or math.nan, want)), None)
+
+
 def _number_clue(source: Source, got: _Given, path: str, value: float, want: float) -> Clue:
     place = _place_of(got)
     code = source.code(got.node)
@@ -333,6 +340,8 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
         hint = f"{code} lacks pi: from degrees to radians is math.radians(...), or * math.pi / 180"
     elif "degrees" in source.code(got.value, 200):
         hint = f"{code} gives degrees: {path} is in rad/s, write {number(want)}"
+    elif (given := _converted_already(source, got.value, want)) is not None:
+        hint = f"{code} converts {given}, which is in radians already: write {number(want)}"
     else:
         hint = f"{code} makes {path} {number(value)}: it must be {number(want)}"
     return Clue(hint, source.place(place))
