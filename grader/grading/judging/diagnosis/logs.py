@@ -6,10 +6,10 @@ import ast
 import math
 import re
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call, silent_topic
+from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call, rounded_down, silent_topic
 from grader.grading.judging.diagnosis.wiring import (
     Made,
-    conditions,
+    callback_nodes,
     constant,
     is_flag,
     is_log,
@@ -268,7 +268,8 @@ def _timer_set_back(case: Case) -> Clue | None:
     """The callback of a subscription starts the only timer anew with each message, or stops it."""
     source, timers = case.source, made(case.source, "timer")
     rare = case.found(LogPaceFacts) is not None or case.found(WrongLogFacts) is not None or bool(silent_topic(case))
-    name = target_of(source, timers[0].call) if len(timers) == 1 else ""
+    names = {target_of(source, timer.call) for timer in timers}
+    name = next(iter(names)) if len(names) == 1 else ""
     if not rare or not name:
         return None
     timed = runs(source, timers[0])
@@ -297,12 +298,16 @@ def _time_in_another_unit(case: Case) -> Clue | None:
     pace, call = case.found(LogPaceFacts), log_call(case)
     if call is None or pace is None:
         return None
-    source, tests = case.source, {n for test in conditions(case.source, call) for n in ast.walk(test.test)}
+    source = case.source
+    tests = {n for node in callback_nodes(source) if isinstance(node, ast.If) for n in ast.walk(node.test)}
+    for node in tests:
+        clue = _of_duration(source, node, pace)
+        if clue is not None:
+            return clue
     for switch in switches(source):
         unit = _unit_s(source, switch.tested) if switch.node in tests else None
         waited_s = switch.limit.value * unit if unit is not None else pace.wanted_s
-        # within the tolerance of what is asked, or the other way round: other rules
-        if unit is None or 0.5 < waited_s / pace.wanted_s < 2 or (waited_s < pace.wanted_s) != (pace.count > 2):
+        if unit is None or not _explains_pace(waited_s, pace):
             continue
         named = next((name for size, name in _UNITS.items() if math.isclose(size, unit)), "")
         if not named:
@@ -313,6 +318,25 @@ def _time_in_another_unit(case: Case) -> Clue | None:
         hint = f"'{source.code(switch.node, 50)}' compares {named}: write {right} for {number(pace.wanted_s)} s"
         return Clue(hint, source.place(switch.limit.origin), key="log_pace")
     return None
+
+
+def _explains_pace(waited_s: float, pace: LogPaceFacts) -> bool:
+    """Return whether waiting this long makes logs as frequent, or as rare, as they are."""
+    far = not 0.5 < waited_s / pace.wanted_s < 2
+    return far and (waited_s < pace.wanted_s) == (pace.count > 2)
+
+
+def _of_duration(source: Source, node: ast.AST, pace: LogPaceFacts) -> Clue | None:
+    """Return a clue if a time is compared with a `Duration` of another length."""
+    if not isinstance(node, ast.Call) or last_name(node.func) != "Duration" or node.args:
+        return None
+    sizes = {"seconds": 1.0, "nanoseconds": 1e-9}
+    parts = [(number_in_code(source, k.value), sizes.get(k.arg or "")) for k in node.keywords]
+    known = [value * size for value, size in parts if value is not None and size is not None]
+    if not known or len(known) < len(parts) or not _explains_pace(sum(known), pace):
+        return None
+    hint = f"{source.code(node, 50)} is {number(sum(known))} s: write Duration(seconds={number(pace.wanted_s)})"
+    return Clue(hint, source.place(node), key="log_pace")
 
 
 def _unit_s(source: Source, node: ast.AST | None, depth: int = 0) -> float | None:
@@ -387,6 +411,8 @@ def _counts(source: Source, test: ast.expr) -> bool:
 
 def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: float) -> Clue | None:
     worth = constant(source, timers[0].period)
+    if worth is not None and worth.value == 0:
+        return rounded_down(source, timers[0], wanted_s)
     if worth is None or abs(worth.value - average_s) > 0.05 * average_s or worth.value == wanted_s:
         return None
     hint = f"{timer_code(source, timers[0])} fires every {number(worth.value)} s: write {wanted_s}"
@@ -512,6 +538,16 @@ def _is_degrees(factor: float | None) -> bool:
     return factor is not None and math.isclose(factor, math.degrees(1.0), rel_tol=_EXACT)
 
 
+def _logged_between(source: Source, test: ast.If, by: ast.BinOp) -> Clue | None:
+    """Return a clue if a condition is true for all messages but those that are asked for: `count % 10`."""
+    asked = test.test
+    unequal = isinstance(asked, ast.Compare) and asked.left is by and isinstance(asked.ops[0], ast.NotEq)
+    if asked is not by and not unequal:
+        return None
+    code = source.code(by, 40)
+    return Clue(f"'{source.code(asked, 40)}' is false when {code} is 0: write {code} == 0", source.place(test))
+
+
 def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:
     """Return a clue if a condition compares the counter itself, as in `count == 10`."""
     asked = test.test
@@ -588,6 +624,6 @@ def _log_every(case: Case) -> Clue | None:
         hint = f"'{source.code(test.test, 40)}' is never true, as it is below {number(worth.value)}: compare with 0"
         return Clue(hint, source.place(test))
     if worth.value == every:
-        return None
+        return _logged_between(source, test, by[0])
     hint = f"{source.code(by[0], 40)} is 0 for every {number(worth.value)}th message: write {every} instead of "
     return Clue(f"{hint}{number(worth.value)}", source.place(worth.origin))

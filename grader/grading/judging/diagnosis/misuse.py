@@ -703,7 +703,7 @@ def _no_number(crash: Crash) -> Clue | None:
             unit = re.fullmatch(r"\s*-?\d+(?:\.\d+)?\s*([%°A-Za-z]{1,3})\s*", found)
             if unit is not None and asked == "float":
                 right = f"float({source.code(call.args[0], 30)}.rstrip('{unit[1]}'))"
-                return Clue(f"the string ends with {unit[1]}, so it is no number: write {right}")
+                return Clue(f"the string ends with {unit[1]}, so it is not a number: write {right}")
             return Clue(f"{code} needs a string that holds only a number: extract the number first")
     return None
 

@@ -6,7 +6,7 @@ import ast
 import math
 from collections.abc import Iterable, Sequence
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, lines_of, silent_topic
+from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, lines_of, rounded_down, silent_topic
 from grader.grading.judging.diagnosis.wiring import (
     Constant,
     Made,
@@ -19,7 +19,6 @@ from grader.grading.judging.diagnosis.wiring import (
     made,
     made_for,
     names_called,
-    number_in_code,
     pauses,
     publish_calls,
     reached,
@@ -27,7 +26,6 @@ from grader.grading.judging.diagnosis.wiring import (
     runs,
     spin_timeout,
     timer_code,
-    value_of,
     waits_for_ever,
 )
 from grader.grading.judging.facts import LogPaceFacts, RateFacts
@@ -107,29 +105,11 @@ def _period(paced: _Paced) -> Clue | None:
         return None
     if worth.value == 0:
         hint = f"{timer_code(paced.source, timers[0])} has a period of 0 s: write {number(paced.period_s)}"
-        return _rounded_down(paced, timers[0]) or Clue(hint, paced.source.place(worth.origin))
+        return rounded_down(paced.source, timers[0], paced.period_s) or Clue(hint, paced.source.place(worth.origin))
     explains = _same(1 / worth.value, paced.found_hz) or (
         paced.facts.count <= 2 and _same(worth.value, paced.facts.first_s)
     )
     return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
-
-
-def _rounded_down(paced: _Paced, timer: Made) -> Clue | None:
-    """Return a clue if an integer division, or `int`, makes 0 of the right period."""
-    source, value = paced.source, value_of(paced.source, timer.period)
-    for node in ast.walk(value) if value is not None else ():
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.FloorDiv):
-            ends = [number_in_code(source, side) for side in (node.left, node.right)]
-            right, why = f"{source.code(node.left, 30)} / {source.code(node.right, 30)}", "// rounds down"
-            period = ends[0] / ends[1] if ends[0] is not None and ends[1] else 0.0
-        elif isinstance(node, ast.Call) and chain(node.func) in ("int", "round") and len(node.args) == 1:
-            right, why = source.code(node.args[0], 40), f"{chain(node.func)} makes an integer of it"
-            period = number_in_code(source, node.args[0]) or 0.0
-        else:
-            continue
-        better = right if _same(period, paced.period_s) else number(paced.period_s)
-        return Clue(f"{source.code(node, 40)} is 0, because {why}: write {better}", source.place(node))
-    return None
 
 
 def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float) -> Clue:

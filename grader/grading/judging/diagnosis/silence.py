@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Container, Sequence
 
 from grader.grading.judging.diagnosis.rules import (
     NO_SOURCE,
@@ -630,18 +631,28 @@ def _guarded(unseen: _Unseen) -> Clue | None:
         heard = len(unseen.case.trace.deliveries(f"/{(item.topic or '').strip('/')}"))
         if not heard or not calls or not all(c in inside for c in calls):
             continue
-        tests = [t for t in conditions(source, calls[0]) if all(t in conditions(source, c) for c in calls)]
+        callers = _callers(source, calls, inside)
+        outer = _shared_conditions(source, callers) if callers else []
+        tests = outer or _shared_conditions(source, calls)
         if not tests:
             continue
-        test = min(tests, key=first_line)
+        test, calls = min(tests, key=first_line), (callers if outer else calls)
         does = "publishes" if silent_topic(unseen.case) else "logs"
         name = last_name(item.callback) or "the callback"
-        ended = "left it" if calls[0] not in set(subtree(test)) else "was never true"
-        hint = (
-            f"{name} ran for each of {heard} messages, but 'if {source.code(test.test, 40)}' {ended} each time before "
-        )
-        return Clue(f"{hint}it {does}: check the condition", source.place(test), key=f"guard:{first_line(test)}")
+        ended = "left it each time before it" if calls[0] not in set(subtree(test)) else "was never true, so it never"
+        hint = f"{name} ran for each of {heard} messages, but 'if {source.code(test.test, 40)}' {ended} {does}"
+        return Clue(f"{hint}: check the condition", source.place(test), key=f"guard:{first_line(test)}")
     return None
+
+
+def _shared_conditions(source: Source, calls: Sequence[ast.Call]) -> list[ast.If]:
+    return [t for t in conditions(source, calls[0]) if all(t in conditions(source, c) for c in calls)]
+
+
+def _callers(source: Source, calls: Sequence[ast.Call], inside: Container[ast.AST]) -> list[ast.Call]:
+    """Return the calls in a callback of the one method that holds other calls; empty if they are in the callback."""
+    names = {source.function_name(c) for c in calls}
+    return [c for name in names for c in source.calls(name) if c in inside] if len(names) == 1 else []
 
 
 @hint_rule(priority=8260)
