@@ -884,8 +884,8 @@ _VARIANTS = (
     _Variant("twist", f"{_TWIST}.x", _TURN, "the logged values are the velocities (twist), not the pose"),
     _Variant("orientation", f"{_TURNED}.x", f"{_TURNED}.y", "the logged values are x and y of the orientation"),
     _Variant("orientation", f"{_TURNED}.z", f"{_TURNED}.w", "the logged values are z and w of the orientation"),
-    _Variant("no_y", X, "pose.pose.position.z", "the second value is z of the position, not y", _SWAP_HINT),
-    _Variant("no_x", Y, "pose.pose.position.z", "the values are y and z of the position, not x and y", _SWAP_HINT),
+    _Variant("no_y", X, "pose.pose.position.z", "the second value fits z of the position, not y", _SWAP_HINT),
+    _Variant("no_x", Y, "pose.pose.position.z", "the values fit y and z of the position, not x and y", _SWAP_HINT),
 )
 _SINGLES = (
     ("only_x", X, "only x is logged, y is missing", "log y too: msg.pose.pose.position.y"),

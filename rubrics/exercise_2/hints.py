@@ -7,6 +7,7 @@ import ast
 from grader.api import (
     Case,
     Clue,
+    Function,
     Maker,
     Outcome,
     Source,
@@ -25,12 +26,12 @@ from grader.api import (
     parameters,
     pauses,
     reached,
+    received,
     roots,
     runs,
     subtree,
 )
 
-_POSITION = "msg.pose.pose.position"
 #: Cause found by the check -> parts of the message that may have been read instead of the position.
 _PARTS = {
     "twist": ("twist",),
@@ -56,6 +57,14 @@ def _cause(case: Case) -> str:
     return "" if facts is None else facts.cause
 
 
+def _position(source: Source) -> str:
+    """Return where the position is, with the name that the callback gives the message."""
+    functions = (f for m in made(source, "subscription") for f in roots(source, m.callback))
+    messages = (received(source, f) for f in functions if isinstance(f, Function))
+    names = (message.name for message in messages if message is not None)
+    return f"{next(filter(None, names), 'msg')}.pose.pose.position"
+
+
 def _reads(source: Source, *parts: str) -> list[ast.Attribute]:
     """Return the outermost attribute reads whose dotted name contains a part."""
     found = []
@@ -75,7 +84,9 @@ def _other_part(case: Case) -> Clue | None:
     if not reads or (cause in ("constant", "no_pair") and _reads(source, "position")):
         return None
     what = next(part for part in _PARTS[cause] if f".{part}." in f"{chain(reads[0])}.")
-    hint = f"{source.code(reads[0], 50)} is the {_MEANING.get(what, what)}: the position is {_POSITION}.x and .y"
+    hint = (
+        f"{source.code(reads[0], 50)} is the {_MEANING.get(what, what)}: the position is {_position(source)}.x and .y"
+    )
     return Clue(hint, source.place(reads[0]))
 
 
@@ -96,7 +107,7 @@ def _copied_axis(case: Case) -> Clue | None:
         ]
         if not right or (field == axis and not part):
             continue
-        meant = f"{_POSITION}.{axis}" if part else f"{owner}.{axis}"
+        meant = f"{_position(source)}.{axis}" if part else f"{owner}.{axis}"
         hint = f"{source.code(target)} gets {part + '.' if part else ''}{field}: write {source.code(target)} = {meant}"
         return Clue(hint, source.place(statement))
     return None
@@ -205,7 +216,9 @@ def _wrong_axis(case: Case) -> Clue | None:
     call = log_call(case)
     if call is None:
         return None
-    return Clue(f"{source.code(call, 60)} does not show {missing}: log {_POSITION}.{missing} too", source.place(call))
+    return Clue(
+        f"{source.code(call, 60)} does not show {missing}: log {_position(source)}.{missing} too", source.place(call)
+    )
 
 
 @_position_rule("first_value", priority=12050)

@@ -263,7 +263,7 @@ def _counted_wrongly(case: Case) -> Clue | None:
     inside = list(reached(source, [function]))
     changes = [n for n in inside if isinstance(n, ast.AugAssign) and isinstance(n.op, (ast.Sub, ast.Add))]
     if len(changes) != 1:
-        return None
+        return _signed(source, inside)
     change, target = changes[0], chain(changes[0].target)
     amount = number_in_code(source, change.value)
     step = None if amount is None else (-amount if isinstance(change.op, ast.Sub) else amount)
@@ -276,6 +276,20 @@ def _counted_wrongly(case: Case) -> Clue | None:
         hint = f"{source.code(change)} comes after {source.code(answers[0], 40)}: change the number first, then answer"
         return Clue(hint, source.place(change), key="sequence")
     return _starts_or_restarts(case, source, target, inside)
+
+
+def _signed(source: Source, inside: list[ast.AST]) -> Clue | None:
+    """`self.charge =- 0.5` assigns the same number each time."""
+    for node in inside:
+        value = node.value if isinstance(node, ast.Assign) else None
+        if not isinstance(node, ast.Assign) or not isinstance(value, ast.UnaryOp):
+            continue
+        code, target = source.code(node), source.code(node.targets[0])
+        given, sign = source.code(value.operand, 30), "-" if isinstance(value.op, ast.USub) else "+"
+        if f"={sign}" in code:
+            hint = f"{code} assigns {sign}{given} each time: write {target} {sign}= {given}"
+            return Clue(hint, source.place(node), key="sequence")
+    return None
 
 
 def _starts_or_restarts(case: Case, source: Source, target: str, inside: list[ast.AST]) -> Clue | None:

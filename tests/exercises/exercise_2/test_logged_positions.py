@@ -290,7 +290,7 @@ def test_a_growing_list_of_positions_shows_the_newest() -> None:
     ("text", "said"),
     [
         ("x={y:.3f} y={x:.3f}", "x and y are swapped"),
-        ("x={x:.3f} y=0.000", "the second value is z of the position, not y"),
+        ("x={x:.3f} y=0.000", "the second value fits z of the position, not y"),
     ],
 )
 def test_wrong_positions_are_shown_beside_the_right_ones(text: str, said: str) -> None:

@@ -222,6 +222,12 @@ def _published_through(crash: Crash, owner: str) -> Clue | None:  # noqa: PLR091
     publishers = made(source, "publisher")
     names = [t for m in publishers if (t := target_of(source, m.call)).startswith("self.")]
     if owner in MESSAGE_FIELDS and len(names) == 1:
+        called = [source.code(n.value) for n in _named(crash)]
+        makers = [source.parents.get(m.call) for m in publishers]
+        over = [n for n in source.stores(names[0]) if source.parents.get(n) not in makers]
+        if names[0] in called and over:
+            hint = f"{names[0]} holds the publisher, and this line replaces it: choose another name"
+            return Clue(hint, source.place(over[0]))
         return Clue(f"publish is a method of the publisher: write {names[0]}.publish(...)")
     if owner == "Subscription" and len(names) == 1:
         return Clue(f"a subscription only receives: write {names[0]}.publish(...)")

@@ -245,6 +245,20 @@ def _starts_with_none(source: Source, store: ast.AST) -> bool:
     return isinstance(value, ast.Constant) and value.value is None
 
 
+@crash_rule("", FaultKind.EXCEPTION, FaultKind.EXITED, priority=4035)
+def _method_over_property(crash: Crash) -> Clue | None:
+    """A method has the name of a property of Node, which rclpy reads."""
+    source = crash.source
+    if crash.fault.kind is FaultKind.EXCEPTION and not crash.said("^TypeError: 'method' object"):
+        return None
+    for owner in source.deriving("Node"):
+        for function in (f for f in owner.body if isinstance(f, Function)):
+            if function.name in NODE_PROPERTIES and not function.decorator_list:
+                hint = f"Node itself uses the name {function.name}: rename the method, for example my_{function.name}"
+                return Clue(hint, source.place(function))
+    return None
+
+
 @crash_rule(
     "Context must be initialized before|rcl_shutdown already called|does not support the context manager"
     "|InvalidHandle|context is (not valid|invalid)",
@@ -505,4 +519,6 @@ def _spun_class(crash: Crash) -> Clue | None:
     name = last_name(call.args[0])
     if not any(c.name == name for c in crash.source.all(ast.ClassDef)):
         return None
-    return Clue(f"spin takes a node, but {name} is the class: write {name}()")
+    here = crash.source.function_of(call)
+    objects = (target_of(crash.source, c) for c in crash.source.calls(name) if crash.source.function_of(c) is here)
+    return Clue(f"spin takes a node, but {name} is the class: write {next(filter(None, objects), f'{name}()')}")

@@ -143,7 +143,29 @@ def _published_wrongly(crash: Crash) -> Clue | None:
     expected, got = wrong[1], wrong[2].rpartition(".")[2]
     if got == f"Metaclass_{expected}":
         return Clue(f"{expected} is the class; publish an object of it: {expected}()")
+    replaced = _replaced_message(crash, expected)
+    if replaced is not None:
+        return replaced
     return Clue(f"this publisher sends {expected} objects, not {got}: create one, set its fields and publish it")
+
+
+def _replaced_message(crash: Crash, expected: str) -> Clue | None:
+    """Return a clue if a variable holds a message first, and then what belongs into a field of it."""
+    source = crash.source
+    for call in source.on_line(crash.line, ast.Call):
+        name = chain(call.args[0]) if last_name(call.func) == "publish" and call.args else ""
+        here = source.function_of(call)
+        near = [n for n in source.stored.get(name, ()) if source.function_of(n) is here or name.startswith("self.")]
+        statements = [s for n in near if isinstance(s := source.parents.get(n), ast.Assign)]
+        made_here = [s for s in statements if isinstance(s.value, ast.Call) and last_name(s.value.func) == expected]
+        others = [s for s in statements if s not in made_here]
+        if not made_here or len(others) != 1:
+            continue
+        code, value = source.code(others[0], 60), source.code(others[0].value, 60)
+        right = f"write {name}.data = {value}" if expected in SINGLE_NUMBERS else "set a field of it instead"
+        hint = f"{code} replaces the {expected} message: {right}"
+        return Clue(hint, source.place(others[0]))
+    return None
 
 
 @crash_rule(r"Parameter\(s\) already declared: \['([\w./]+)'", in_file=False, priority=5030)

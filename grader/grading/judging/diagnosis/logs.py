@@ -6,14 +6,16 @@ import ast
 import math
 import re
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call
+from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_call, rounded_down, silent_topic
 from grader.grading.judging.diagnosis.wiring import (
     Made,
+    callback_nodes,
     constant,
     is_flag,
     is_log,
     made,
     made_for,
+    message_of,
     names_in,
     number_in_code,
     pauses,
@@ -21,7 +23,10 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     runs,
+    switches,
+    target_of,
     timer_code,
+    value_of,
 )
 from grader.grading.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import printed_lines, student_records
@@ -258,6 +263,108 @@ def _set_inside(test: ast.If) -> bool:
     return any(chain(t) in names_in(test.test) for t in stored)
 
 
+@hint_rule(priority=11085)
+def _timer_set_back(case: Case) -> Clue | None:
+    """The callback of a subscription starts the only timer anew with each message, or stops it."""
+    source, timers = case.source, made(case.source, "timer")
+    rare = case.found(LogPaceFacts) is not None or case.found(WrongLogFacts) is not None or bool(silent_topic(case))
+    names = {target_of(source, timer.call) for timer in timers}
+    name = next(iter(names)) if len(names) == 1 else ""
+    if not rare or not name:
+        return None
+    timed = runs(source, timers[0])
+    for item in made(source, "subscription"):
+        for node in runs(source, item):
+            called = node.func if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) else None
+            if called is None or chain(called.value) != name or called.attr not in ("reset", "cancel") or node in timed:
+                continue
+            does = "starts the timer anew with" if called.attr == "reset" else "stops the timer after"
+            hint = f"{source.code(node, 40)} {does} each message, so that it never fires: remove it"
+            return Clue(hint, source.place(node), key="log_pace")
+    return None
+
+
+#: What one of it is, in seconds -> how it is called.
+_UNITS = {1e-9: "nanoseconds", 1e-6: "microseconds", 1e-3: "milliseconds", 1.0: "seconds"}
+_IN_NANOSECONDS = ("time_ns", "monotonic_ns", "perf_counter_ns")
+_IN_SECONDS = ("time.time", "time.monotonic", "time.perf_counter")
+#: How many names and operators of a time are followed.
+_DEEPEST_TIME = 8
+
+
+@hint_rule(priority=11095)
+def _time_in_another_unit(case: Case) -> Clue | None:
+    """A log waits for a time that is compared in nanoseconds or milliseconds with a number of seconds."""
+    pace, call = case.found(LogPaceFacts), log_call(case)
+    if call is None or pace is None:
+        return None
+    source = case.source
+    tests = {n for node in callback_nodes(source) if isinstance(node, ast.If) for n in ast.walk(node.test)}
+    for node in tests:
+        clue = _of_duration(source, node, pace)
+        if clue is not None:
+            return clue
+    for switch in switches(source):
+        unit = _unit_s(source, switch.tested) if switch.node in tests else None
+        waited_s = switch.limit.value * unit if unit is not None else pace.wanted_s
+        if unit is None or not _explains_pace(waited_s, pace):
+            continue
+        named = next((name for size, name in _UNITS.items() if math.isclose(size, unit)), "")
+        if not named:
+            continue
+        exact, power = pace.wanted_s / unit, round(math.log10(1 / unit))
+        right = f"{number(pace.wanted_s)} * 1e{power}" if power > 3 and pace.wanted_s != 1 else f"1e{power}"
+        right = right if power > 3 else number(exact)
+        hint = f"'{source.code(switch.node, 50)}' compares {named}: write {right} for {number(pace.wanted_s)} s"
+        return Clue(hint, source.place(switch.limit.origin), key="log_pace")
+    return None
+
+
+def _explains_pace(waited_s: float, pace: LogPaceFacts) -> bool:
+    """Return whether waiting this long makes logs as frequent, or as rare, as they are."""
+    far = not 0.5 < waited_s / pace.wanted_s < 2
+    return far and (waited_s < pace.wanted_s) == (pace.count > 2)
+
+
+def _of_duration(source: Source, node: ast.AST, pace: LogPaceFacts) -> Clue | None:
+    """Return a clue if a time is compared with a `Duration` of another length."""
+    if not isinstance(node, ast.Call) or last_name(node.func) != "Duration" or node.args:
+        return None
+    sizes = {"seconds": 1.0, "nanoseconds": 1e-9}
+    parts = [(number_in_code(source, k.value), sizes.get(k.arg or "")) for k in node.keywords]
+    known = [value * size for value, size in parts if value is not None and size is not None]
+    if not known or len(known) < len(parts) or not _explains_pace(sum(known), pace):
+        return None
+    hint = f"{source.code(node, 50)} is {number(sum(known))} s: write Duration(seconds={number(pace.wanted_s)})"
+    return Clue(hint, source.place(node), key="log_pace")
+
+
+def _unit_s(source: Source, node: ast.AST | None, depth: int = 0) -> float | None:
+    """Return how many seconds one unit of a time is, as far as the text shows it."""
+    if node is None or depth > _DEEPEST_TIME:
+        return None
+    if isinstance(node, ast.BinOp):
+        return _unit_of_pair(source, node, depth)
+    called = node.func if isinstance(node, ast.Call) else None
+    if last_name(called) in _IN_NANOSECONDS or (isinstance(node, ast.Attribute) and node.attr == "nanoseconds"):
+        return 1e-9
+    if called is not None:
+        return 1.0 if source.resolved(called) in _IN_SECONDS else None
+    value = value_of(source, node)
+    return None if value is node else _unit_s(source, value, depth + 1)
+
+
+def _unit_of_pair(source: Source, node: ast.BinOp, depth: int) -> float | None:
+    """Return the unit of a difference of times, or of one that is multiplied or divided by a number."""
+    left, right = _unit_s(source, node.left, depth + 1), _unit_s(source, node.right, depth + 1)
+    if isinstance(node.op, ast.Sub):
+        return left if left is not None else right
+    by = number_in_code(source, node.right)
+    if left is None or not by or not isinstance(node.op, (ast.Mult, ast.Div, ast.FloorDiv)):
+        return None
+    return left / by if isinstance(node.op, ast.Mult) else left * by
+
+
 @hint_rule(priority=11100)
 def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback sets the wrong pace."""
@@ -266,9 +373,11 @@ def _log_period(case: Case) -> Clue | None:
         return None
     source, wanted_s, average = case.source, pace.wanted_s, pace.average_s
     worth = constant(source, argument(call, 99, "throttle_duration_sec"))
-    if worth is not None and 0.8 * worth.value <= average <= 1.3 * worth.value:
+    rare = pace.count <= 2 and worth is not None and worth.value > 2 * wanted_s
+    if worth is not None and (rare or 0.8 * worth.value <= average <= 1.3 * worth.value):
         hint = f"throttle_duration_sec={number(worth.value)} allows a log every {number(worth.value)} s"
-        return Clue(f"{hint}: write {wanted_s}", source.place(worth.origin), key="log_pace")
+        unit = ", because it is in seconds" if rare else ""
+        return Clue(f"{hint}: write {wanted_s}{unit}", source.place(worth.origin), key="log_pace")
     timers = [m for m in made(source, "timer") if call in runs(source, m)]
     if timers:
         return _timer_pace(source, timers, average, wanted_s) if len(timers) == 1 else None
@@ -302,6 +411,8 @@ def _counts(source: Source, test: ast.expr) -> bool:
 
 def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: float) -> Clue | None:
     worth = constant(source, timers[0].period)
+    if worth is not None and worth.value == 0:
+        return rounded_down(source, timers[0], wanted_s)
     if worth is None or abs(worth.value - average_s) > 0.05 * average_s or worth.value == wanted_s:
         return None
     hint = f"{timer_code(source, timers[0])} fires every {number(worth.value)} s: write {wanted_s}"
@@ -338,26 +449,27 @@ def _received_not_logged(case: Case) -> Clue | None:
     if item is None or not start or facts is None or not facts.missing:
         return None
     inside = list(reached(source, start))
+    received_as = f"{message_of(source, item)}.data"
     logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
     if len(logs) == 1:
-        return _wrong_log(source, logs[0], inside)
+        return _wrong_log(source, logs[0], inside, received_as)
     elsewhere = any(is_log(source, n) and _shows(n, _stored(inside)) for n in source.all(ast.Call))
     if logs or elsewhere or case.verdict.outcome is not Outcome.NOT_MET:
         return None
     name = last_name(item.callback) or "the callback"
-    return Clue(f"{name} receives the values but does not log them: log msg.data in it", source.place(start[0]))
+    return Clue(f"{name} receives the values but does not log them: log {received_as} in it", source.place(start[0]))
 
 
-def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST]) -> Clue | None:
+def _wrong_log(source: Source, log: ast.Call, inside: list[ast.AST], received_as: str) -> Clue | None:
     """Return a clue if a log shows no value, or only attributes unrelated to the message."""
     names = [n for a in log.args for n in _inner(a) if isinstance(n, (ast.Name, ast.Attribute))]
     if not names:
-        return Clue("this log contains no value: log what was received, msg.data", source.place(log))
+        return Clue(f"this log contains no value: log what was received, {received_as}", source.place(log))
     whole = [n for n in names if not isinstance(source.parents.get(n), ast.Attribute)]
     own = [chain(n) for n in whole if chain(n).startswith("self.")]
     if len(own) < len(whole) or set(own) & _stored(inside):
         return None
-    return Clue(f"{source.code(log, 60)} does not show what was received: log msg.data", source.place(log))
+    return Clue(f"{source.code(log, 60)} does not show what was received: log {received_as}", source.place(log))
 
 
 #: Functions that convert an angle to radians.
@@ -366,6 +478,10 @@ _TO_RADIANS = ("radians", "deg2rad")
 _DEEPEST_FACTOR = 12
 #: A factor beyond this makes degrees of radians.
 _DEGREES = 50.0
+#: Pi with four decimals, 3.1416, is as exact as this; with two, it is not, and a log with two decimals shows it.
+_EXACT = 1e-5
+#: A factor as near as this, such as 180 / 3.14 or 57, is meant to be the right one.
+_NEARLY = 0.06
 
 
 @hint_rule("logs_values", outcome=Outcome.NOT_MET, problem=ProblemKind.WRONG_VALUE, priority=11140)
@@ -382,8 +498,8 @@ def _converted_wrongly(case: Case) -> Clue | None:
     scaled = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, (ast.Mult, ast.Div))]
     whole = [n for n in scaled if source.parents.get(n) not in scaled]
     wrong = [n for n in whole if _factor(source, n) not in (None, 1.0) and not _is_degrees(_factor(source, n))]
-    if len(wrong) == 1 and wants_degrees and advice:
-        return Clue(advice, source.place(wrong[0]))
+    if len(wrong) == 1 and wants_degrees:
+        return _wrong_factor(source, wrong[0])
     logs = [n for n in inside if isinstance(n, ast.Call) and is_log(source, n)]
     return Clue(advice, source.place(logs[0])) if len(logs) == 1 and advice else None
 
@@ -399,8 +515,37 @@ def _factor(source: Source, node: ast.AST, depth: int = 0) -> float | None:
     return left * right if isinstance(node.op, ast.Mult) else left / right if right else None
 
 
+def _wrong_factor(source: Source, node: ast.BinOp) -> Clue:
+    """Return the clue for a product or quotient that should make degrees of radians."""
+    factor = _factor(source, node) or 0.0
+    near = math.isclose(abs(factor), math.degrees(1.0), rel_tol=_NEARLY)
+    does = "is not exact enough" if near else "does not make degrees of radians"
+    return Clue(f"{source.code(node, 50)} {does}: write math.degrees({_converted(source, node)})", source.place(node))
+
+
+def _converted(source: Source, node: ast.expr) -> str:
+    """Return the code of the only unknown part of a product or quotient."""
+    while True:
+        if isinstance(node, ast.BinOp):
+            node = node.right if number_in_code(source, node.left) is not None else node.left
+        elif isinstance(node, ast.Call) and chain(node.func) in ("int", "round", "float") and node.args:
+            node = node.args[0]
+        else:
+            return source.code(node, 40)
+
+
 def _is_degrees(factor: float | None) -> bool:
-    return factor is not None and math.isclose(factor, math.degrees(1.0), rel_tol=1e-3)
+    return factor is not None and math.isclose(factor, math.degrees(1.0), rel_tol=_EXACT)
+
+
+def _logged_between(source: Source, test: ast.If, by: ast.BinOp) -> Clue | None:
+    """Return a clue if a condition is true for all messages but those that are asked for: `count % 10`."""
+    asked = test.test
+    unequal = isinstance(asked, ast.Compare) and asked.left is by and isinstance(asked.ops[0], ast.NotEq)
+    if asked is not by and not unequal:
+        return None
+    code = source.code(by, 40)
+    return Clue(f"'{source.code(asked, 40)}' is false when {code} is 0: write {code} == 0", source.place(test))
 
 
 def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:
@@ -479,6 +624,6 @@ def _log_every(case: Case) -> Clue | None:
         hint = f"'{source.code(test.test, 40)}' is never true, as it is below {number(worth.value)}: compare with 0"
         return Clue(hint, source.place(test))
     if worth.value == every:
-        return None
+        return _logged_between(source, test, by[0])
     hint = f"{source.code(by[0], 40)} is 0 for every {number(worth.value)}th message: write {every} instead of "
     return Clue(f"{hint}{number(worth.value)}", source.place(worth.origin))

@@ -6,7 +6,14 @@ import ast
 import re
 from collections.abc import Iterator
 
-from grader.grading.judging.diagnosis.names import KEYWORD_SLIPS, MESSAGE_FIELDS, SIGNATURES, SINGLE_NUMBERS, article
+from grader.grading.judging.diagnosis.names import (
+    KEYWORD_SLIPS,
+    MESSAGE_FIELDS,
+    NODE_METHODS,
+    SIGNATURES,
+    SINGLE_NUMBERS,
+    article,
+)
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
 from grader.grading.judging.diagnosis.wiring import (
     constant,
@@ -19,6 +26,7 @@ from grader.grading.judging.diagnosis.wiring import (
     variable_of,
 )
 from grader.grading.judging.source import (
+    Function,
     Source,
     argument,
     chain,
@@ -160,7 +168,8 @@ def _not_callable(crash: Crash) -> Clue | None:
     kind = crash.found[1]
     if kind == "str":
         return _quoted_callback(crash)
-    clues = (_called_value(crash.source, kind, call) for call in _calls(crash))
+    source = crash.source
+    clues = (_hidden_method(source, call.func) or _called_value(source, kind, call) for call in _calls(crash))
     return next((clue for clue in clues if clue is not None), None)
 
 
@@ -179,6 +188,16 @@ def _called_value(source: Source, kind: str, call: ast.Call) -> Clue | None:
     if isinstance(call.func, ast.Constant):
         return Clue(f"a number before a parenthesis is a call: to multiply, write {code} * (...)")
     return None
+
+
+def _hidden_method(source: Source, func: ast.expr) -> Clue | None:
+    """Return a clue if an attribute takes the name of a method, of Node or of the file."""
+    dotted, name = chain(func), last_name(func)
+    methods = any(source.is_method(f) for f in source.functions(name))
+    if dotted != f"self.{name}" or not (methods or name in NODE_METHODS):
+        return None
+    hint = f"{dotted} is assigned here, which hides the method of this name: choose another name"
+    return next((Clue(hint, source.place(store)) for store in source.stores(dotted)), None)
 
 
 def _is_publisher(source: Source, func: ast.expr) -> bool:
@@ -246,12 +265,30 @@ def _wrong_request(crash: Crash) -> Clue | None:
         if len(functions) != 1 or len(parameters(functions[0])) < 2:
             continue
         response = parameters(functions[0])[-1]
+        replaced = _replaced_response(source, functions[0], response)
+        if replaced is not None:
+            return replaced
         returns = [r for r in source.all(ast.Return) if source.function_of(r) is functions[0]]
         wrong = [r for r in returns if chain(r.value) != response and not isinstance(r.value, ast.Call)]
         if wrong:
             return Clue(
                 f"{functions[0].name} must return the response itself: return {response}", source.place(wrong[0])
             )
+    return None
+
+
+def _replaced_response(source: Source, function: Function, response: str) -> Clue | None:
+    """Return a clue if the callback of a service assigns something else to its parameter for the response."""
+    for statement in source.all(ast.Assign):
+        value = statement.value
+        target = response in map(chain, statement.targets)
+        if source.function_of(statement) is not function or not target or isinstance(value, ast.Call):
+            continue
+        if last_name(value) == "Response":
+            hint = f"{source.code(value, 40)} is the class: remove this line, because {function.name} already receives "
+            return Clue(f"{hint}the response", source.place(statement))
+        hint = f"{source.code(statement, 60)} replaces the response: set a field of {response} instead"
+        return Clue(hint, source.place(statement))
     return None
 
 
@@ -663,6 +700,10 @@ def _no_number(crash: Crash) -> Clue | None:
                 return Clue(f"{code} takes only integers: write float({source.code(call.args[0], 30)})")
             if re.fullmatch(r"-?\d+,\d+", found):
                 return Clue("Python has no decimal comma: write 0.5 instead of 0,5")
+            unit = re.fullmatch(r"\s*-?\d+(?:\.\d+)?\s*([%°A-Za-z]{1,3})\s*", found)
+            if unit is not None and asked == "float":
+                right = f"float({source.code(call.args[0], 30)}.rstrip('{unit[1]}'))"
+                return Clue(f"the string ends with {unit[1]}, so it is not a number: write {right}")
             return Clue(f"{code} needs a string that holds only a number: extract the number first")
     return None
 

@@ -6,10 +6,11 @@ import ast
 import math
 from collections.abc import Iterable, Sequence
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, lines_of, silent_topic
+from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, lines_of, rounded_down, silent_topic
 from grader.grading.judging.diagnosis.wiring import (
     Constant,
     Made,
+    callback_nodes,
     called_only,
     changes,
     conditions,
@@ -27,7 +28,7 @@ from grader.grading.judging.diagnosis.wiring import (
     timer_code,
     waits_for_ever,
 )
-from grader.grading.judging.facts import RateFacts
+from grader.grading.judging.facts import LogPaceFacts, RateFacts
 from grader.grading.judging.source import Loop, Source, argument, chain, first_line, last_name
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import number
@@ -74,6 +75,25 @@ def _same(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=_SAME)
 
 
+@hint_rule(priority=9005)
+def _timer_made_again(case: Case) -> Clue | None:
+    """A callback creates a timer each time it runs, and none is stopped."""
+    rate, pace = case.found(RateFacts), case.found(LogPaceFacts)
+    often = rate is not None and (
+        rate.rate_hz > getattr(case.check, "rate", math.inf) or case.is_about(ProblemKind.BURSTS)
+    )
+    if not (often or (pace is not None and 0 < pace.average_s < pace.wanted_s)):
+        return None
+    source, inside = case.source, callback_nodes(case.source)
+    stopped = any(source.calls("cancel", "destroy_timer", "destroy"))
+    again = [m.call for m in made(source, "timer") if m.call in inside and not conditions(source, m.call)]
+    if stopped or not again:
+        return None
+    name = source.function_name(again[0]) or "the callback"
+    hint = f"{name} creates another timer each time it runs: create the timer once, in __init__"
+    return Clue(hint, source.place(again[0]))
+
+
 @hint_rule("topic_rate", given=_paced, priority=9010)
 def _period(paced: _Paced) -> Clue | None:
     """The period of the timer explains the rate."""
@@ -84,10 +104,8 @@ def _period(paced: _Paced) -> Clue | None:
     if worth is None or _same(worth.value, paced.period_s):
         return None
     if worth.value == 0:
-        code = timer_code(paced.source, timers[0])
-        why = "; // rounds down to an integer, / does not" if "//" in code else ""
-        hint = f"{code} has a period of 0 s: write {number(paced.period_s)}{why}"
-        return Clue(hint, paced.source.place(worth.origin))
+        hint = f"{timer_code(paced.source, timers[0])} has a period of 0 s: write {number(paced.period_s)}"
+        return rounded_down(paced.source, timers[0], paced.period_s) or Clue(hint, paced.source.place(worth.origin))
     explains = _same(1 / worth.value, paced.found_hz) or (
         paced.facts.count <= 2 and _same(worth.value, paced.facts.first_s)
     )

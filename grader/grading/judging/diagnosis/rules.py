@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
@@ -10,12 +11,13 @@ from dataclasses import field, replace
 from functools import partial
 from typing import Any, TypeVar
 
-from grader.grading.judging.diagnosis.wiring import is_log, made_for
+from grader.grading.judging.diagnosis.wiring import Made, is_log, made_for, number_in_code, value_of
 from grader.grading.judging.logs.outputs import student_records
-from grader.grading.judging.source import Source, first_line
+from grader.grading.judging.source import Source, chain, first_line
 from grader.grading.judging.values import published, student_endpoints
 from grader.grading.model.exercise import Check, Criterion, Location, Outcome, ProblemKind, named, roles_of
 from grader.grading.model.report import Verdict
+from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import Fault, FaultKind, Trace
 
@@ -25,6 +27,8 @@ NO_SOURCE = Source("")
 _ANYTHING = re.compile("")
 #: The place of a rule of a rubric's own, unless it says another: before all rules of the grader, which begin at 1000.
 FIRST = 100
+#: Largest relative difference of two periods that are taken for the same.
+_SAME_PERIOD = 0.03
 Given = TypeVar("Given")
 
 
@@ -310,6 +314,24 @@ def log_call(case: Case) -> ast.Call | None:
             return call
     logs = [n for n in source.all(ast.Call) if is_log(source, n)]
     return logs[0] if len(logs) == 1 else None
+
+
+def rounded_down(source: Source, timer: Made, period_s: float) -> Clue | None:
+    """Return a clue if an integer division, or `int`, makes 0 of a period."""
+    value = value_of(source, timer.period)
+    for node in ast.walk(value) if value is not None else ():
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.FloorDiv):
+            ends = [number_in_code(source, side) for side in (node.left, node.right)]
+            right, why = f"{source.code(node.left, 30)} / {source.code(node.right, 30)}", "// rounds down"
+            period = ends[0] / ends[1] if ends[0] is not None and ends[1] else 0.0
+        elif isinstance(node, ast.Call) and chain(node.func) in ("int", "round") and len(node.args) == 1:
+            right, why = source.code(node.args[0], 40), f"{chain(node.func)} makes an integer of it"
+            period = number_in_code(source, node.args[0]) or 0.0
+        else:
+            continue
+        better = right if math.isclose(period, period_s, rel_tol=_SAME_PERIOD) else number(period_s)
+        return Clue(f"{source.code(node, 40)} is 0, because {why}: write {better}", source.place(node))
+    return None
 
 
 def lines_of(node: ast.AST, *others: ast.AST) -> str:

@@ -14,6 +14,7 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     short,
+    spin_for,
     target_of,
     text_in_code,
 )
@@ -141,7 +142,7 @@ def _synchronous_call(case: Case) -> Clue | None:
             return Clue(f"{hint}: use call_async and add_done_callback", source.place(call), key="waits_in_callback")
         if not names & {*_THREADS, "MultiThreadedExecutor"}:
             hint = f"{code} waits forever: nothing spins the node meanwhile; use call_async, "
-            return Clue(f"{hint}then rclpy.spin_until_future_complete(node, future)", source.place(call), key="unspun")
+            return Clue(f"{hint}then {spin_for(source, call)}", source.place(call), key="unspun")
     return None
 
 
@@ -166,11 +167,12 @@ def _future_never_done(case: Case) -> Clue | None:
     if {last_name(n) for n in source.names()} & {*_THREADS, "MultiThreadedExecutor"}:
         return None
     for loop in source.all(ast.While):
-        asks = any(isinstance(n, ast.Call) and last_name(n.func) == "done" for n in ast.walk(loop.test))
-        inside = names_called(source, [loop])
-        if asks and not inside & set(SPINS):
+        asked = [n.func for n in ast.walk(loop.test) if isinstance(n, ast.Call) and last_name(n.func) == "done"]
+        if asked and not names_called(source, [loop]) & set(SPINS):
+            future = chain(asked[0]).removesuffix(".done") or "future"
             hint = f"'while {source.code(loop.test, 40)}' never ends: a response is taken only while the node spins; "
-            return Clue(f"{hint}use rclpy.spin_until_future_complete(node, future)", source.place(loop))
+            advice = _waiting_in(source, loop, future) or f"use {spin_for(source, loop, future)}"
+            return Clue(f"{hint}{advice}", source.place(loop))
     return None
 
 
@@ -187,6 +189,12 @@ def _shared_callback_group(case: Case) -> Clue | None:
     hint = f"{source.code(waits[0])} waits in a callback, and the client shares its callback group: "
     hint += "no response is taken meanwhile; create_client(..., callback_group=ReentrantCallbackGroup())"
     return Clue(hint, source.place(clients[0]), key="shared_group")
+
+
+def _waiting_in(source: Source, place: ast.AST, future: str) -> str:
+    """Return what to do about a future in a callback, which must not wait; empty elsewhere."""
+    inside = place in callback_nodes(source)
+    return f"read the response in a function given to {future}.add_done_callback" if inside else ""
 
 
 def _unawaited(source: Source) -> ast.AST | None:
@@ -211,8 +219,11 @@ def _too_early(source: Source) -> Clue | None:
     found = _unawaited(source)
     if found is None:
         return None
+    owner = chain(found.func.value) if isinstance(found, ast.Call) and isinstance(found.func, ast.Attribute) else ""
+    future = owner if owner and "(" not in owner else "future"
     hint = f"{source.code(found)} is read before the response has arrived, so it is None: "
-    hint += "first call rclpy.spin_until_future_complete(node, future)"
+    waits = _waiting_in(source, found, future)
+    hint += waits or f"first call {spin_for(source, found, future)}"
     return Clue(hint, source.place(found), key="result_too_early")
 
 
@@ -248,7 +259,9 @@ def _future_is_no_answer(crash: Crash) -> Clue | None:
             code = source.code(call, 50)
             return Clue(f"call_async returns a future: write await {code} to get the response", source.place(call))
     hint = f"call_async returns a future, and {name} is in the response: call "
-    return Clue(f"{hint}rclpy.spin_until_future_complete(node, future), then future.result().{name}")
+    used = next(source.on_line(crash.line, ast.Attribute), next(source.calls("call_async")))
+    spin = spin_for(source, used)
+    return Clue(f"{hint}{spin}, then future.result().{name}")
 
 
 @crash_rule(

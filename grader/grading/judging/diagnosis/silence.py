@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Container, Sequence
 
 from grader.grading.judging.diagnosis.rules import (
     NO_SOURCE,
@@ -459,7 +460,9 @@ def _nested_spin(unseen: _Unseen) -> Clue | None:
             continue
         code = source.code(call)
         if function.name == "__init__":
-            hint = f"{code} in the constructor does not return: nothing after it runs"
+            elsewhere = any(last_name(n) == last_name(call.func) and n is not call.func for n in spins(source))
+            advice = "remove it" if elsewhere else "call it in main, once the node is made"
+            hint = f"{code} in the constructor does not return, so nothing after it runs: {advice}"
             return Clue(hint, source.place(call), key="nested_spin")
         if any(call in runs(source, m) for m in made(source, "timer", "subscription")):
             hint = f"{code} inside a callback waits for something that can only arrive after the callback returns"
@@ -628,18 +631,28 @@ def _guarded(unseen: _Unseen) -> Clue | None:
         heard = len(unseen.case.trace.deliveries(f"/{(item.topic or '').strip('/')}"))
         if not heard or not calls or not all(c in inside for c in calls):
             continue
-        tests = [t for t in conditions(source, calls[0]) if all(t in conditions(source, c) for c in calls)]
+        callers = _callers(source, calls, inside)
+        outer = _shared_conditions(source, callers) if callers else []
+        tests = outer or _shared_conditions(source, calls)
         if not tests:
             continue
-        test = min(tests, key=first_line)
+        test, calls = min(tests, key=first_line), (callers if outer else calls)
         does = "publishes" if silent_topic(unseen.case) else "logs"
         name = last_name(item.callback) or "the callback"
-        ended = "left it" if calls[0] not in set(subtree(test)) else "was never true"
-        hint = (
-            f"{name} ran for each of {heard} messages, but 'if {source.code(test.test, 40)}' {ended} each time before "
-        )
-        return Clue(f"{hint}it {does}: check the condition", source.place(test), key=f"guard:{first_line(test)}")
+        ended = "left it each time before it" if calls[0] not in set(subtree(test)) else "was never true, so it never"
+        hint = f"{name} ran for each of {heard} messages, but 'if {source.code(test.test, 40)}' {ended} {does}"
+        return Clue(f"{hint}: check the condition", source.place(test), key=f"guard:{first_line(test)}")
     return None
+
+
+def _shared_conditions(source: Source, calls: Sequence[ast.Call]) -> list[ast.If]:
+    return [t for t in conditions(source, calls[0]) if all(t in conditions(source, c) for c in calls)]
+
+
+def _callers(source: Source, calls: Sequence[ast.Call], inside: Container[ast.AST]) -> list[ast.Call]:
+    """Return the calls in a callback of the one method that holds other calls; empty if they are in the callback."""
+    names = {source.function_name(c) for c in calls}
+    return [c for name in names for c in source.calls(name) if c in inside] if len(names) == 1 else []
 
 
 @hint_rule(priority=8260)

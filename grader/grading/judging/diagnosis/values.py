@@ -16,12 +16,13 @@ from grader.grading.judging.diagnosis.wiring import (
     made,
     made_for,
     number_in_code,
+    roots,
     runs,
     target_of,
     variable_of,
 )
 from grader.grading.judging.facts import DrawFacts, SeriesFacts
-from grader.grading.judging.source import Source, chain, first_line, last_name, words
+from grader.grading.judging.source import Function, Source, chain, first_line, last_name, words
 from grader.grading.judging.values import as_number, leaves, number_path, published, published_numbers, value_at
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import moment, number
@@ -320,6 +321,13 @@ def _wrong_number(wrong: _Wrong) -> Clue | None:
     return None
 
 
+def _converted_already(source: Source, value: ast.expr, want: float) -> str | None:
+    """Return the code of the right number that is converted to radians; None if there is none."""
+    calls = (n for n in ast.walk(value) if isinstance(n, ast.Call) and len(n.args) == 1)
+    given = (c.args[0] for c in calls if last_name(c.func) in _TO_RADIANS)
+    return next((source.code(a, 30) for a in given if _is(number_in_code(source, a) or math.nan, want)), None)
+
+
 def _number_clue(source: Source, got: _Given, path: str, value: float, want: float) -> Clue:
     place = _place_of(got)
     code = source.code(got.node)
@@ -332,6 +340,8 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
         hint = f"{code} lacks pi: from degrees to radians is math.radians(...), or * math.pi / 180"
     elif "degrees" in source.code(got.value, 200):
         hint = f"{code} gives degrees: {path} is in rad/s, write {number(want)}"
+    elif (given := _converted_already(source, got.value, want)) is not None:
+        hint = f"{code} converts {given}, which is in radians already: write {number(want)}"
     else:
         hint = f"{code} makes {path} {number(value)}: it must be {number(want)}"
     return Clue(hint, source.place(place))
@@ -662,6 +672,13 @@ def _drawn_once(case: Case) -> Clue | None:
         if seeds:
             hint = f"{source.code(seeds[0])} in the callback restarts the same sequence each time: remove it"
             return Clue(hint, source.place(seeds[0]), key="draw")
+        for function in roots(source, timer.callback):
+            defaults = [n for d in _defaults(function) for n in ast.walk(d) if n in draws(source)]
+            if defaults:
+                hint = (
+                    f"the default {source.code(defaults[0], 40)} is drawn once, when Python reads this line: draw it "
+                )
+                return Clue(f"{hint}in the body of the function", source.place(defaults[0]), key="draw")
         drawn = [c for c in draws(source) if c in inside]
         outside = (c for c in draws(source) if c not in inside)
         early = [c for c in outside if source.function_name(c) in ("", "__init__", "main")]
@@ -670,6 +687,13 @@ def _drawn_once(case: Case) -> Clue | None:
             hint = f"{source.code(early[0])} is drawn once, when the node starts: draw it in {name}"
             return Clue(hint, source.place(early[0]), key="draw")
     return None
+
+
+def _defaults(function: ast.AST) -> list[ast.expr]:
+    """Return the defaults of a function's parameters."""
+    if not isinstance(function, (Function, ast.Lambda)):
+        return []
+    return [d for d in (*function.args.defaults, *function.args.kw_defaults) if d is not None]
 
 
 @hint_rule("random_in_range", priority=10210)

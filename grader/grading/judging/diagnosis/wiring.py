@@ -520,6 +520,31 @@ def variable_of(source: Source, call: ast.AST, otherwise: str = "node") -> str:
     return target_of(source, call) or otherwise if isinstance(source.parents.get(call), ast.Assign) else otherwise
 
 
+def node_at(source: Source, place: ast.AST) -> str:
+    """Return what the node is called at a place: `self` in its own methods, elsewhere its variable."""
+    function = source.function_of(place)
+    if function is not None and source.is_method(function) and source.class_of(function) in source.deriving("Node"):
+        return "self"
+    node = node_made(source)
+    seen = node is not None and source.function_of(node) in (function, None)
+    return variable_of(source, node) if node is not None and seen else "node"
+
+
+def spin_for(source: Source, place: ast.AST, future: str = "future") -> str:
+    """Return the call that waits for a future at a place."""
+    return f"rclpy.spin_until_future_complete({node_at(source, place)}, {future})"
+
+
+def message_of(source: Source, item: Made | None) -> str:
+    """Return what the callback of a subscription calls its message; `msg` if the text does not show it."""
+    for function in roots(source, item.callback) if item is not None else ():
+        names = parameters(function) if isinstance(function, (Function, ast.Lambda)) else []
+        own = [n for n in names if n != "self"]
+        if own:
+            return own[0]
+    return "msg"
+
+
 def timer_code(source: Source, item: Made) -> str:
     """Return the code that creates a timer, in short."""
     period = source.code(item.period, 40) if item.period is not None else "?"
