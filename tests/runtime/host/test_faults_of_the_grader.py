@@ -56,6 +56,12 @@ MISTAKES = {
     "socket.gethostbyname(5)": "TypeError",
     "importlib.import_module('no_such_module')": "ModuleNotFoundError: No module named 'no_such_module'",
     "class Half(rclpy.publisher.Publisher):\n    def __init__(self): pass\nHalf().publish(Twist())": "AttributeError",
+    "time.sleep.seconds": "AttributeError: 'builtin_function_or_method' object has no attribute 'seconds'",
+    "time.sleep.seconds = 1": "AttributeError: 'builtin_function_or_method' object has no attribute 'seconds'",
+    "threading.Lock().release(1)": "TypeError",
+    "threading.RLock().owner": "AttributeError",
+    "queue.SimpleQueue().size()": "AttributeError",
+    "queue.SimpleQueue().get(timeout='x')": "TypeError",
     "raise KeyError('mine')": "KeyError: 'mine'",
 }
 #: Raises each of the mistakes, and prints whose it is.

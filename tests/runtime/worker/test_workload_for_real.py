@@ -103,7 +103,7 @@ def test_a_rare_block_that_delays_other_timers_is_noticed(run: Callable[..., Tra
 
 
 HOST = """
-kept = [cell.cell_contents for cell in time.sleep.__closure__]
+kept = [cell.cell_contents for cell in time.sleep.__call__.__closure__]
 self.time = next(one._ask_for_time.__self__ for one in kept if hasattr(one, "_ask_for_time"))
 """
 ARRIVED = """
