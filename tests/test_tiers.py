@@ -2,56 +2,40 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter
 
 import pytest
 from tiers import spread
 
+TABLES = {(1, 1): (1, 1, 20), (4, 6): (4, 6, 12), (7, 0): (7, 0, 15), (0, 5): (0, 5, 17), (50, 50): (20, 1, 1)}
 TABLE = """
-import pytest
-
 @pytest.mark.breadth({default}, {long})
 @pytest.mark.parametrize(
     "n", [*range(20), pytest.param(20, marks=pytest.mark.long), pytest.param(21, marks=pytest.mark.nightly)]
 )
-def test_table(n): ...
-
+def test_{default}_{long}(n): ...
+"""
+OTHER = """
 @pytest.mark.parametrize("n", range(3))
 def test_other(n): ...
 """
 
 
-def tiers_of(items: list[pytest.Item]) -> dict[str, list[str]]:
-    found = defaultdict(list)
-    for item in items:
-        tier = next((name for name in ("nightly", "long") if item.get_closest_marker(name)), "default")
-        found[tier].append(item.name)
-    return found
+def tier_of(item: pytest.Item) -> str:
+    return next((name for name in ("nightly", "long") if item.get_closest_marker(name)), "default")
 
 
-@pytest.mark.parametrize(
-    ("default", "long", "expected"),
-    [(1, 1, (1, 1, 20)), (4, 6, (4, 6, 12)), (7, 0, (7, 0, 15)), (0, 5, (0, 5, 17)), (50, 50, (20, 1, 1))],
-)
-def test_a_table_gives_so_many_rows_to_each_tier(
-    pytester: pytest.Pytester, default: int, long: int, expected: tuple[int, int, int]
-) -> None:
-    """And no other table gives any."""
-    items = pytester.getitems(TABLE.format(default=default, long=long))
+def test_a_table_gives_so_many_rows_to_each_tier(pytester: pytest.Pytester) -> None:
+    """Those of a tier are spread over the table, and no other table gives any."""
+    tables = "".join(TABLE.format(default=default, long=long) for default, long in TABLES)
+    items = pytester.getitems(f"import pytest\n{tables}{OTHER}")
     spread(items)
-    found = tiers_of(items)
-    others = {f"test_other[{n}]" for n in range(3)}
-    assert others <= set(found["default"])
-    assert (len(found["default"]) - 3, len(found["long"]), len(found["nightly"])) == expected
-
-
-def test_the_rows_of_a_tier_are_spread(pytester: pytest.Pytester) -> None:
-    """The first, and then at equal distances."""
-    items = pytester.getitems(TABLE.format(default=4, long=0))
-    spread(items)
-    assert [name for name in tiers_of(items)["default"] if "table" in name] == [
-        f"test_table[{n}]" for n in (0, 5, 10, 15)
-    ]
+    found = Counter((item.name.partition("[")[0], tier_of(item)) for item in items)
+    for (default, long), expected in TABLES.items():
+        assert tuple(found[f"test_{default}_{long}", tier] for tier in ("default", "long", "nightly")) == expected
+    assert found["test_other", "default"] == 3
+    first = [item.name for item in items if item.name.startswith("test_4_6") and tier_of(item) == "default"]
+    assert first == [f"test_4_6[{n}]" for n in (0, 5, 10, 15)]
 
 
 @pytest.mark.slow

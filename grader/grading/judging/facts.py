@@ -15,6 +15,7 @@ class RateFacts:
     first_s: float  # time of the first, since the scenario began
     rate_hz: float = math.nan
     longest_s: float = math.nan  # longest time from one message to the next
+    wanted_hz: float = math.nan  # what the check expects; NaN if it expects no rate
 
 
 @dataclass(frozen=True, slots=True)

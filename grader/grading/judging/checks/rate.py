@@ -114,7 +114,7 @@ class TopicRate:
         # A flaw first: with bursts, a stop or a late start, the average says nothing, however right it is.
         graded = self._flaw(trace, found, evidence) or self._grade(found, evidence)
         finding = (self._slack(found, evidence) if graded.credit else None) or graded
-        return replace(finding, facts=RateFacts(len(inside), seconds(inside[0]), found.rate_hz, found.max_s))
+        return replace(finding, facts=RateFacts(len(inside), seconds(inside[0]), found.rate_hz, found.max_s, self.rate))
 
     @property
     def _period_ns(self) -> float:

@@ -79,9 +79,7 @@ def _same(one: float, other: float) -> bool:
 def _timer_made_again(case: Case) -> Clue | None:
     """A callback creates a timer each time it runs, and none is stopped."""
     rate, pace = case.found(RateFacts), case.found(LogPaceFacts)
-    often = rate is not None and (
-        rate.rate_hz > getattr(case.check, "rate", math.inf) or case.is_about(ProblemKind.BURSTS)
-    )
+    often = rate is not None and (rate.rate_hz > rate.wanted_hz or case.is_about(ProblemKind.BURSTS))
     if not (often or (pace is not None and 0 < pace.average_s < pace.wanted_s)):
         return None
     source, inside = case.source, callback_nodes(case.source)
