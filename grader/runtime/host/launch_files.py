@@ -728,10 +728,15 @@ def _read(path: str) -> str:
 def _namespace(context: Context, own: str | None) -> str | None:
     """Return the namespace of a node: its own below those that were pushed; None if there is none at all."""
     parts = [*context.namespaces, *([] if own is None else [own])]
+    return _absolute(parts) if parts else None
+
+
+def _absolute(parts: Iterable[str]) -> str:
+    """Return the namespace that consists of others, each below the one before unless it begins with a slash."""
     whole = ""
     for part in filter(None, parts):
         whole = part if part.startswith("/") else f"{whole.rstrip('/')}/{part}"
-    return (whole or "/") if parts else None
+    return whole or "/"
 
 
 def _flat(parameters: Mapping[Any, Any], context: Context, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -810,6 +815,8 @@ def _setting(name: str, put: Callable[..., Any]) -> type[Action]:
 
 def _push_namespace(context: Context, namespace: Any) -> None:
     context.namespaces.append(text_of(namespace, context))
+    # launch_ros keeps the namespace there, and launch files read it.
+    context.launch_configurations["ros_namespace"] = _absolute(context.namespaces)
 
 
 def _set_parameters(context: Context, path: Any, *_: Any) -> None:

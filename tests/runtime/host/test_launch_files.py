@@ -132,6 +132,17 @@ def test_groups_have_a_scope(described: Callable[..., Described]) -> None:
     assert ros(nodes) == [*(["-r", f"__ns:={name}", *more] for name in names), []]
 
 
+def test_a_pushed_namespace_is_a_launch_configuration(described: Callable[..., Described]) -> None:
+    """As in launch_ros, where launch files read it, inside of its group only."""
+    name = "LaunchConfiguration('ros_namespace', default='none')"
+    nodes, _ = described(
+        f"GroupAction([PushRosNamespace('a'), PushRosNamespace('b'), Node(**TALKER, name={name}),"
+        f"  GroupAction([PushRosNamespace('/c'), Node(**TALKER, name={name})])]), Node(**TALKER, name={name})"
+    )
+    names = [word.removeprefix("__node:=") for words in ros(nodes) for word in words if word.startswith("__node:=")]
+    assert names == ["/a/b", "/c", "none"]
+
+
 @pytest.mark.parametrize(("arguments", "started"), [({}, ["yes"]), ({"go": "false"}, ["no"]), ({"go": "1"}, ["yes"])])
 def test_conditions_choose(described: Callable[..., Described], arguments: dict[str, str], started: list[str]) -> None:
     """By an argument, whose default counts if it is not given."""
