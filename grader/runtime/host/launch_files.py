@@ -49,7 +49,7 @@ class LeftOutError(BaseException):
 
     def __init__(self, code: str, name: str = "", text: str = "") -> None:
         super().__init__(code)
-        self.told = {"code": code, "name": name[:MOST_CHARACTERS], "text": text[:MOST_CHARACTERS]}
+        self.told: dict[str, Any] = {"code": code, "name": name[:MOST_CHARACTERS], "text": text[:MOST_CHARACTERS]}
         self.place = _written_at()
 
 
@@ -1256,7 +1256,8 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
         most_left_out: So many things are said to be left out.
 
     Returns:
-        The nodes, and what was left out with `code`, `name`, `text` and `count`, each with `file` and `line`.
+        The nodes, and what was left out with `code`, `name`, `text`, `count` and, if nothing was evaluated after it,
+        `ends`, each with `file` and `line`.
     """
     global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
     _folders = tuple(os.path.join(folder, "") for folder in folders)
@@ -1283,6 +1284,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
 
 def _leave_out_all(context: Context, path: str, error: LeftOutError) -> None:
     """Note what ended the evaluation of a launch file."""
+    error.told["ends"] = True
     file, line = error.place
     context.leave_out(file or os.path.basename(path), line, error)
 

@@ -619,8 +619,20 @@ def test_a_node_with_an_argument_that_is_left_out_is_left_out(
         ({"code": "parameter_file", "name": "a.yaml"}, "the parameter file a.yaml was left out: it is not there"),
         ({"code": "action", "name": "EmitEvent"}, "the action EmitEvent is not supported and was left out"),
         ({"code": "of the student's"}, "something is not supported and was left out"),
+        (
+            {"code": "command", "text": "ros2 node list", "ends": True},
+            'the command "ros2 node list" is not supported and was left out; the launch file was evaluated no further',
+        ),
     ],
 )
-def test_what_is_left_out_has_its_reason(told: dict[str, str], said: str) -> None:
+def test_what_is_left_out_has_its_reason(told: dict[str, Any], said: str) -> None:
     """As a sentence for notes."""
     assert left_out_sentence(told).startswith(said)
+
+
+def test_what_ends_the_evaluation_says_so(described: Callable[..., Described]) -> None:
+    """Nothing that follows is started, which is no news where a single action is left out."""
+    nodes, left_out = described("ExecuteProcess(cmd=['rm', 'x']), Node(**TALKER)")
+    assert (len(nodes), ["ends" in one for one in left_out]) == (1, [False])
+    nodes, left_out = described("Node(**TALKER, name=get_package_share_directory('turtlesim')), Node(**TALKER)")
+    assert (nodes, [one.get("ends") for one in left_out]) == ([], [True])
