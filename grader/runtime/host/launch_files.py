@@ -49,7 +49,7 @@ class LeftOutError(BaseException):
 
     def __init__(self, code: str, name: str = "", text: str = "") -> None:
         super().__init__(code)
-        self.told = {"code": code, "name": name[:MOST_CHARACTERS], "text": text[:MOST_CHARACTERS]}
+        self.told: dict[str, Any] = {"code": code, "name": name[:MOST_CHARACTERS], "text": text[:MOST_CHARACTERS]}
         self.place = _written_at()
 
 
@@ -728,10 +728,15 @@ def _read(path: str) -> str:
 def _namespace(context: Context, own: str | None) -> str | None:
     """Return the namespace of a node: its own below those that were pushed; None if there is none at all."""
     parts = [*context.namespaces, *([] if own is None else [own])]
+    return _absolute(parts) if parts else None
+
+
+def _absolute(parts: Iterable[str]) -> str:
+    """Return the namespace that consists of others, each below the one before unless it begins with a slash."""
     whole = ""
     for part in filter(None, parts):
         whole = part if part.startswith("/") else f"{whole.rstrip('/')}/{part}"
-    return (whole or "/") if parts else None
+    return whole or "/"
 
 
 def _flat(parameters: Mapping[Any, Any], context: Context, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -810,6 +815,8 @@ def _setting(name: str, put: Callable[..., Any]) -> type[Action]:
 
 def _push_namespace(context: Context, namespace: Any) -> None:
     context.namespaces.append(text_of(namespace, context))
+    # launch_ros keeps the namespace there, and launch files read it.
+    context.launch_configurations["ros_namespace"] = _absolute(context.namespaces)
 
 
 def _set_parameters(context: Context, path: Any, *_: Any) -> None:
@@ -1249,7 +1256,8 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
         most_left_out: So many things are said to be left out.
 
     Returns:
-        The nodes, and what was left out with `code`, `name`, `text` and `count`, each with `file` and `line`.
+        The nodes, and what was left out with `code`, `name`, `text`, `count` and, if nothing was evaluated after it,
+        `ends`, each with `file` and `line`.
     """
     global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
     _folders = tuple(os.path.join(folder, "") for folder in folders)
@@ -1276,6 +1284,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
 
 def _leave_out_all(context: Context, path: str, error: LeftOutError) -> None:
     """Note what ended the evaluation of a launch file."""
+    error.told["ends"] = True
     file, line = error.place
     context.leave_out(file or os.path.basename(path), line, error)
 

@@ -203,12 +203,12 @@ def shipped_packages() -> tuple[InterfacePackage, ...]:
 
 
 def _counts(path: Path, root: Path) -> bool:
-    """Whether a file is a source: not hidden, and not in a folder that colcon made or ignores."""
+    """Whether a file is a source: not hidden, and not below `root` in a folder that colcon made or ignores."""
     inner = path.relative_to(root)
     return (
         _is_inside(path, root)
         and not any(part.startswith(".") for part in inner.parts)
-        and not any((root / folder / "COLCON_IGNORE").exists() for folder in inner.parents)
+        and not any((root / folder / "COLCON_IGNORE").exists() for folder in inner.parents if folder.name)
     )
 
 

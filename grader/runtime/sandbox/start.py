@@ -44,7 +44,7 @@ LAST_CAPABILITY = 63
 CAPABILITIES_VERSION_3 = 0x20080522  # linux/capability.h
 CAP_DAC_READ_SEARCH = 2
 #: From sys/mman.h.
-PROT_READ, MAP_PRIVATE_FIXED_ANONYMOUS, MAP_FAILED = 1, 0x02 | 0x10 | 0x20, ctypes.c_void_p(-1).value
+PROT_READ, PROT_WRITE, MAP_PRIVATE_FIXED_ANONYMOUS, MAP_FAILED = 1, 2, 0x02 | 0x10 | 0x20, ctypes.c_void_p(-1).value
 #: A line of /proc/PID/maps about memory that is shared with other processes.
 SHARED_MEMORY = re.compile(rb"^([0-9a-f]+)-([0-9a-f]+) ...s ", re.MULTILINE)
 
@@ -127,19 +127,32 @@ def require_restrictions(user: list[int] | None) -> None:
 
 
 def make_memory_private() -> None:
-    """Replace memory that this process shares with others by empty pages of its own.
+    """Replace memory that this process shares with others by pages of its own, with the same content.
 
     A fork shares two pages with the process that has loaded LTTng. It could not write to them, but wake the threads
-    that wait on them. The pages stay mapped, because the library unmaps them at exit.
+    that wait on them. The pages stay mapped, because the library unmaps them at exit, and keep their content, because
+    the C library reads its table of character sets there: `setlocale` divides by a number in it.
     """
     system = ctypes.CDLL(None, use_errno=True)
     system.mmap.restype = ctypes.c_void_p
     with open("/proc/self/maps", "rb") as file:
         shared = SHARED_MEMORY.findall(file.read())
     for begin, end in ((int(first, 16), int(last, 16)) for first, last in shared):
-        at, length = ctypes.c_void_p(begin), ctypes.c_size_t(end - begin)
-        if system.mmap(at, length, PROT_READ, MAP_PRIVATE_FIXED_ANONYMOUS, -1, ctypes.c_long(0)) == MAP_FAILED:
+        content, at, length = content_of(begin, end - begin), ctypes.c_void_p(begin), ctypes.c_size_t(end - begin)
+        writable = PROT_READ | PROT_WRITE
+        if system.mmap(at, length, writable, MAP_PRIVATE_FIXED_ANONYMOUS, -1, ctypes.c_long(0)) == MAP_FAILED:
             raise OSError(ctypes.get_errno(), "memory of its own")
+        ctypes.memmove(begin, content, len(content))
+        if system.mprotect(at, length, PROT_READ):
+            raise OSError(ctypes.get_errno(), "memory of its own")
+
+
+def content_of(begin: int, length: int) -> bytes:
+    """Return what this process has in its memory, up to the first page that nothing is behind."""
+    # Whoever reads a page behind the end of its file is ended by a signal; the kernel, asked by a file, says so.
+    with open("/proc/self/mem", "rb", buffering=0) as file, contextlib.suppress(OSError):
+        return os.pread(file.fileno(), length, begin)
+    return b""
 
 
 def enter_folder(request: dict[str, Any]) -> None:

@@ -122,7 +122,8 @@ def left_out_sentence(data: Mapping[str, Any]) -> str:
     why, words = _WHY.get(code), left_out_words(data)
     if code == "nodes" and type(count) is int and 1 < count < MOST_COUNTED:
         return f"{count} nodes beyond the first {MOST_LAUNCHED} were left out: {why}"
-    return f"{words} was left out: {why}" if why else f"{words} is not supported and was left out"
+    told = f"{words} was left out: {why}" if why else f"{words} is not supported and was left out"
+    return f"{told}; the launch file was evaluated no further" if data.get("ends") is True else told
 
 
 _WAYS = {way.value: way for way in StartWay}

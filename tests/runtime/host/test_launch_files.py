@@ -132,6 +132,17 @@ def test_groups_have_a_scope(described: Callable[..., Described]) -> None:
     assert ros(nodes) == [*(["-r", f"__ns:={name}", *more] for name in names), []]
 
 
+def test_a_pushed_namespace_is_a_launch_configuration(described: Callable[..., Described]) -> None:
+    """As in launch_ros, where launch files read it, inside of its group only."""
+    name = "LaunchConfiguration('ros_namespace', default='none')"
+    nodes, _ = described(
+        f"GroupAction([PushRosNamespace('a'), PushRosNamespace('b'), Node(**TALKER, name={name}),"
+        f"  GroupAction([PushRosNamespace('/c'), Node(**TALKER, name={name})])]), Node(**TALKER, name={name})"
+    )
+    names = [word.removeprefix("__node:=") for words in ros(nodes) for word in words if word.startswith("__node:=")]
+    assert names == ["/a/b", "/c", "none"]
+
+
 @pytest.mark.parametrize(("arguments", "started"), [({}, ["yes"]), ({"go": "false"}, ["no"]), ({"go": "1"}, ["yes"])])
 def test_conditions_choose(described: Callable[..., Described], arguments: dict[str, str], started: list[str]) -> None:
     """By an argument, whose default counts if it is not given."""
@@ -608,8 +619,20 @@ def test_a_node_with_an_argument_that_is_left_out_is_left_out(
         ({"code": "parameter_file", "name": "a.yaml"}, "the parameter file a.yaml was left out: it is not there"),
         ({"code": "action", "name": "EmitEvent"}, "the action EmitEvent is not supported and was left out"),
         ({"code": "of the student's"}, "something is not supported and was left out"),
+        (
+            {"code": "command", "text": "ros2 node list", "ends": True},
+            'the command "ros2 node list" is not supported and was left out; the launch file was evaluated no further',
+        ),
     ],
 )
-def test_what_is_left_out_has_its_reason(told: dict[str, str], said: str) -> None:
+def test_what_is_left_out_has_its_reason(told: dict[str, Any], said: str) -> None:
     """As a sentence for notes."""
     assert left_out_sentence(told).startswith(said)
+
+
+def test_what_ends_the_evaluation_says_so(described: Callable[..., Described]) -> None:
+    """Nothing that follows is started, which is no news where a single action is left out."""
+    nodes, left_out = described("ExecuteProcess(cmd=['rm', 'x']), Node(**TALKER)")
+    assert (len(nodes), ["ends" in one for one in left_out]) == (1, [False])
+    nodes, left_out = described("Node(**TALKER, name=get_package_share_directory('turtlesim')), Node(**TALKER)")
+    assert (nodes, [one.get("ends") for one in left_out]) == ([], [True])

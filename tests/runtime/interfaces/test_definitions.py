@@ -69,6 +69,14 @@ def test_what_colcon_made_or_ignores_is_no_source(tmp_path: Path) -> None:
     assert [each.name for each in find_packages(tmp_path)] == ["a_msgs"]
 
 
+def test_a_folder_that_is_named_counts_although_colcon_ignores_it(tmp_path: Path) -> None:
+    """A hint says to name it where a program needs it."""
+    write(tmp_path, "a_msgs/COLCON_IGNORE")
+    write(tmp_path, "a_msgs/msg/Foo.msg", "int32 a\n")
+    assert find_packages(tmp_path) == ()
+    assert [each.name for each in find_packages(tmp_path / "a_msgs")] == ["a_msgs"]
+
+
 def test_two_folders_that_define_a_package_differently_are_refused(tmp_path: Path) -> None:
     write(tmp_path, "one/a_msgs/msg/Foo.msg", "int32 a\n")
     write(tmp_path, "two/a_msgs/msg/Foo.msg", "int32 b\n")

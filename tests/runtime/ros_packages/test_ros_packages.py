@@ -545,6 +545,7 @@ PROGRAMS = {
         "from tf2_ros.transform_broadcaster import TransformBroadcaster\n"
         "from tf2_ros.static_transform_broadcaster import StaticTransformBroadcaster\n"
         "from tf2_ros import LookupException\n"
+        "from tf2_ros import Duration, Node, TFMessage, Time, TransformStamped\n"
         "try:\n    Buffer().lookup_transform('a', 'b', Time())\nexcept LookupException as error:\n    log(str(error))",
         ['"a" passed to lookupTransform argument target_frame does not exist. '],
     ),

@@ -366,6 +366,17 @@ def test_nothing_of_a_start_is_found_by_a_later_one(run: Callable[..., Trace], s
         assert [json.loads(line) for line in printed(trace)] == [[[], [*OPEN_PLACES], [*OPEN_PLACES], []]], number
 
 
+READS_CHARACTER_SETS = """
+import locale
+print(locale.setlocale(locale.LC_ALL, ""))
+"""
+
+
+def test_the_c_library_finds_its_table_of_character_sets(run: Callable[..., Trace]) -> None:
+    """It shares that with all processes, and looks into it when a program, or Tcl for it, sets the locale."""
+    assert printed(run(READS_CHARACTER_SETS)) == ["C.UTF-8"]
+
+
 def below() -> set[int]:
     """Return the descendants of this process."""
     return families([os.getpid()])[os.getpid()] - {os.getpid()}

@@ -204,6 +204,23 @@ def _undeclared_parameter(crash: Crash) -> Clue | None:
     return Clue(f"declare the parameter first, in __init__: self.declare_parameter('{name}', default_value)")
 
 
+@crash_rule(r"undeclared parameter\(s\): \[\]", priority=5045)
+def _sets_undeclared(crash: Crash) -> Clue | None:
+    """`set_parameters` with a parameter that is not declared, which its exception does not name."""
+    function = crash.source.function_at(crash.line)
+    within = [c for c in crash.source.calls("Parameter") if function is None or covers(function, c.lineno)]
+    names = [name for call in within if (name := text_of(argument(call, 0, "name")))]
+    calls = [*crash.source.calls("declare_parameter")]
+    declared = {name for call in calls if (name := text_of(argument(call, 0, "name")))}
+    missing = next((name for name in names if name not in declared), "")
+    if not missing:
+        return None
+    called, last = named(missing, 60), missing.replace(".", "/").rpartition("/")[2]
+    if last in declared:
+        return Clue(f"the parameter is called {named(last, 60)}, not {called}")
+    return Clue(f"declare the parameter first, in __init__: self.declare_parameter('{called}', default_value)")
+
+
 @crash_rule("does not support the context manager|__enter__", priority=5050)
 def _with_init(crash: Crash) -> Clue | None:
     """`with rclpy.init():`, which only later releases of rclpy support."""

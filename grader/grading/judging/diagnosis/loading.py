@@ -16,7 +16,7 @@ from grader.grading.judging.diagnosis.names import (
     import_of,
 )
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
-from grader.grading.judging.source import Source, chain, covers, last_name
+from grader.grading.judging.source import Source, argument, chain, covers, last_name, text_of
 from grader.grading.model.exercise import Location
 from grader.grading.model.wording import named, quote
 from grader.runtime.model.submission import EXPORT_NOTEBOOK
@@ -294,6 +294,9 @@ def _missing_file(crash: Crash) -> Clue | None:
     name = named(path, 60)
     if any(last_name(n.func) in _STARTERS and covers(n, crash.line) for n in source.all(ast.Call)):
         return Clue(f"the program {name} is not installed where submissions run: do without it")
+    if any(_writes(call) for call in source.on_line(crash.line, ast.Call)):
+        hint = f"there is no folder for {name}: create it with os.makedirs(..., exist_ok=True)"
+        return Clue(f"{hint}, or write to the folder that the program runs in")
     if path.startswith("/"):
         return Clue(f"{name} exists only on your computer: hand the file in with the program, and open it by its name")
     ways = {start.way for start in crash.case.trace.starts if start.process == crash.case.process}
@@ -301,6 +304,15 @@ def _missing_file(crash: Crash) -> Clue | None:
         hint = f"`ros2 run` starts a program in any folder: let setup.py install {name} with data_files"
         return Clue(f"{hint}, and open it in the folder that get_package_share_directory returns")
     return Clue(f"{name} is not in the submission: hand it in, in the folder of the program")
+
+
+def _writes(call: ast.Call) -> bool:
+    """Return whether a call creates a file."""
+    if last_name(call.func) != "open":
+        return last_name(call.func) in ("write_text", "write_bytes")
+    place = 1 if isinstance(call.func, ast.Name) else 0
+    mode = text_of(argument(call, place, "mode")) or ""
+    return bool(set(mode) & set("wax")) and set(mode) <= set("waxbt+")
 
 
 @crash_rule(r"partially initialized module '(\w+)' has no attribute", in_file=False, priority=1110)

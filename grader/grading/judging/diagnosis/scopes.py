@@ -48,7 +48,8 @@ def _undefined_name(crash: Crash) -> Clue | None:
         or _imported(source, name)
         or _in_another_function(source, name, function, crash.line)
         or _stored(source, name, inside)
-        or _misspelt(source, name)
+        or _misspelt(source, name, crash.line)
+        or _class_called_otherwise(source, name, crash.line)
         or _message_number(crash, name, function)
         or _of_another_callback(source, name, function)
         or _never_assigned(source, name)
@@ -160,9 +161,17 @@ def _in_another_function(source: Source, name: str, function: Function | None, l
     return None
 
 
-def _misspelt(source: Source, name: str) -> Clue | None:
-    near = closest(name, _defined(source), 0.8)
+def _misspelt(source: Source, name: str, line: int) -> Clue | None:
+    near = closest(name, _defined(source, line), 0.8)
     return Clue(f"{name} is not defined; the file has {near}") if near else None
+
+
+def _class_called_otherwise(source: Source, name: str, line: int) -> Clue | None:
+    """An object of a class that has another name, in a file with one class."""
+    classes = [found.name for found in source.all(ast.ClassDef)]
+    if len(classes) != 1 or not name[:1].isupper() or all(c.lineno != line for c in source.calls(name)):
+        return None
+    return Clue(f"{name} is not defined; the class is called {classes[0]}")
 
 
 def _message_number(crash: Crash, name: str, function: Function | None) -> Clue | None:
@@ -195,7 +204,7 @@ def _of_another_callback(source: Source, name: str, function: Function | None) -
 
 
 def _never_assigned(source: Source, name: str) -> Clue | None:
-    if name in source.stored or name in source.aliases or source.stars or name in _defined(source):
+    if name in source.stored or name in source.aliases or source.stars or name in _defined(source, 0):
         return None
     fields = [n for n in source.all(ast.Attribute) if chain(n.value) == name and isinstance(n.ctx, ast.Store)]
     types = {m.type for m in made(source, "publisher")} - {""}
@@ -204,8 +213,9 @@ def _never_assigned(source: Source, name: str) -> Clue | None:
     return Clue(f"nothing in the file assigns {name}: assign it before this line, or correct the name")
 
 
-def _defined(source: Source) -> list[str]:
-    names = [n.id for n in source.all(ast.Name) if isinstance(n.ctx, ast.Store)]
+def _defined(source: Source, line: int) -> list[str]:
+    """Return the names that a file defines elsewhere than in a line, which is about to define its own."""
+    names = [n.id for n in source.all(ast.Name) if isinstance(n.ctx, ast.Store) and n.lineno != line]
     names += [f.name for f in source.functions() if not source.is_method(f)]
     names += [c.name for c in source.all(ast.ClassDef)]
     names += [a.arg for a in source.all(ast.arg)]

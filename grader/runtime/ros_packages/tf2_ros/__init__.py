@@ -3,6 +3,15 @@
 The behaviour is that of https://docs.ros.org/en/jazzy/p/tf2_ros_py/ as documented.
 """
 
+# What the modules of ROS's own package import is in it as well, and its tutorials import it from there.
+from geometry_msgs.msg import TransformStamped
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+from rclpy.time import Time
+from tf2_msgs.msg import TFMessage
+from tf2_msgs.srv import FrameGraph
 from tf2_py import (
     ConnectivityException,
     ExtrapolationException,
@@ -30,16 +39,24 @@ __all__ = [
     "BufferInterface",
     "ConnectivityException",
     "ConvertRegistration",
+    "Duration",
     "ExtrapolationException",
+    "FrameGraph",
+    "Future",
     "InvalidArgumentException",
     "LookupException",
+    "Node",
     "NotImplementedException",
+    "QoSProfile",
     "StaticTransformBroadcaster",
+    "TFMessage",
+    "Time",
     "TimeoutException",
     "TransformBroadcaster",
     "TransformException",
     "TransformListener",
     "TransformRegistration",
+    "TransformStamped",
     "TypeException",
     "convert",
 ]
