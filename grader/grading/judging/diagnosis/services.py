@@ -268,7 +268,7 @@ def _future_is_no_answer(crash: Crash) -> Clue | None:
     r"'(\w+)_Request' object has no attribute '(\w+)'|'(\w+)_Response' object has no attribute '(\w+)'", priority=3100
 )
 def _request_is_response(crash: Crash) -> Clue | None:
-    """The callback of a service names its parameters in the wrong order."""
+    """The request of a service is taken for its response: swapped parameters, or a field of the other one."""
     source = crash.source
     for call in _ends(source, "service"):
         for function in roots(source, argument(call, 2, "callback")):
