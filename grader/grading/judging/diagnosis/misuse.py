@@ -528,21 +528,33 @@ def _text_compared(crash: Crash) -> Clue | None:
 def _text_side(source: Source, side: ast.expr) -> Clue | None:
     """Return a clue about the text in a comparison, at the line that makes it if it is used for nothing else."""
     code = source.code(side, 60)
-    if isinstance(side, ast.Call) and chain(side.func) == "str" and len(side.args) == 1:
-        return Clue(f"{code} is a string: write {source.code(side.args[0], 60)}, without str")
+    if _made_by(side, "str"):
+        return Clue(f"{code} is a string: write {_inside(source, side)}, without str")
     for call in (s.value for s in source.all(ast.Expr)):
-        converts = isinstance(call, ast.Call) and chain(call.func) in ("float", "int") and len(call.args) == 1
         here = source.function_of(call) is source.function_of(side)
-        if isinstance(call, ast.Call) and converts and here and chain(call.args[0]) == chain(side) != "":
+        if here and _made_by(call, "float", "int") and source.code(call) in (f"float({code})", f"int({code})"):
             return Clue(f"{source.code(call)} does not change {code}: write {code} = float({code})", source.place(call))
     value = sole_assignment(source, side) if isinstance(side, ast.Name) else None
-    if value is None or not isinstance(value, (ast.Call, ast.Subscript)):
-        return Clue(f"{code} is a string: write float({code}) to compare it with a number") if value is None else None
-    if not _is_only_compared(source, side):
+    whole = value or side
+    if isinstance(whole, ast.Attribute) and whole.attr == "message":
+        hint = f"{source.code(whole, 60)} is a whole text: take the number out of it, and convert it with float(...)"
+        return Clue(hint, source.place(whole))
+    if isinstance(value, (ast.Call, ast.Subscript)) and _is_only_compared(source, side):
+        right = _inside(source, value) if _made_by(value, "str") else f"float({source.code(value, 60)})"
+        return Clue(f"{code} is a string: write {code} = {right}", source.place(value))
+    if value is None or isinstance(value, (ast.Call, ast.Subscript)):
         return Clue(f"{code} is a string: write float({code}) to compare it with a number")
-    if isinstance(value, ast.Call) and chain(value.func) == "str" and len(value.args) == 1:
-        return Clue(f"{code} is a string: write {code} = {source.code(value.args[0], 60)}", source.place(value))
-    return Clue(f"{code} is a string: write {code} = float({source.code(value, 60)})", source.place(value))
+    return None
+
+
+def _made_by(node: ast.expr, *names: str) -> bool:
+    """Return whether an expression is a call of a conversion, such as `str(x)`."""
+    return isinstance(node, ast.Call) and chain(node.func) in names and len(node.args) == 1
+
+
+def _inside(source: Source, call: ast.expr) -> str:
+    """Return the code of the only argument of a call."""
+    return source.code(call.args[0], 60) if isinstance(call, ast.Call) else ""
 
 
 def _is_only_compared(source: Source, name: ast.expr) -> bool:
