@@ -142,11 +142,33 @@ def _published_wrongly(crash: Crash) -> Clue | None:
         return Clue("publish takes the message to send: publish(msg)")
     expected, got = wrong[1], wrong[2].rpartition(".")[2]
     if got == f"Metaclass_{expected}":
-        return Clue(f"{expected} is the class; publish an object of it: {expected}()")
+        return _published_class(crash, expected)
     replaced = _replaced_message(crash, expected)
     if replaced is not None:
         return replaced
     return Clue(f"this publisher sends {expected} objects, not {got}: create one, set its fields and publish it")
+
+
+def _published_class(crash: Crash, expected: str) -> Clue:
+    """`publish(Twist)` beside a message that is filled in, or of a variable that holds the class."""
+    source = crash.source
+    made = [a for a in source.all(ast.Assign) if len(a.targets) == 1]
+    for call in source.on_line(crash.line, ast.Call):
+        name = chain(call.args[0]) if last_name(call.func) == "publish" and call.args else ""
+        held = [a for a in made if name and chain(a.targets[0]) == name and chain(a.value) == expected]
+        if held:
+            hint = f"{expected} is the class: write {source.code(held[0])}() to create an object"
+            return Clue(hint, source.place(held[0]))
+        here = source.function_of(call)
+        objects = {
+            target: None
+            for a in made
+            if isinstance(a.value, ast.Call) and last_name(a.value.func) == expected
+            if (target := chain(a.targets[0])).startswith("self.") or source.function_of(a) is here
+        }
+        if len(objects) == 1:
+            return Clue(f"{expected} is the class: publish the message, publish({next(iter(objects))})")
+    return Clue(f"{expected} is the class; publish an object of it: {expected}()")
 
 
 def _replaced_message(crash: Crash, expected: str) -> Clue | None:

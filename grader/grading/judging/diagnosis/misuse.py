@@ -16,12 +16,14 @@ from grader.grading.judging.diagnosis.names import (
 )
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
 from grader.grading.judging.diagnosis.wiring import (
+    ORDERS,
     constant,
     made,
     message_classes,
     node_made,
     number_in_code,
     received,
+    sole_assignment,
     target_of,
     variable_of,
 )
@@ -507,7 +509,7 @@ def _text_or_list_as_number(crash: Crash) -> Clue | None:
     return None
 
 
-@crash_rule(r"not supported between instances of '(?:float|int|str)' and '(?:float|int|str)'", priority=7120)
+@crash_rule(r"not supported between instances of '(float|int|str)' and '(float|int|str)'", priority=7120)
 def _text_compared(crash: Crash) -> Clue | None:
     """A number is compared with a text."""
     source = crash.source
@@ -515,7 +517,53 @@ def _text_compared(crash: Crash) -> Clue | None:
         for side in (test.left, *test.comparators):
             if written := quoted_number(side):
                 return Clue(f"{source.code(side)} is a string: compare with the number {written}")
+    tests = [t for t in source.on_line(crash.line, ast.Compare) if isinstance(t.ops[0], ORDERS)]
+    if len(tests) == 1 and len(tests[0].ops) == 1:
+        found = _text_side(source, tests[0].left if crash.found[1] == "str" else tests[0].comparators[0])
+        if found is not None:
+            return found
     return Clue("one side is a string, the other a number: convert the string with float(...)")
+
+
+def _text_side(source: Source, side: ast.expr) -> Clue | None:
+    """Return a clue about the text in a comparison, at the line that makes it if it is used for nothing else."""
+    code = source.code(side, 60)
+    if _made_by(side, "str"):
+        return Clue(f"{code} is a string: write {_inside(source, side)}, without str")
+    for call in (s.value for s in source.all(ast.Expr)):
+        here = source.function_of(call) is source.function_of(side)
+        if here and _made_by(call, "float", "int") and source.code(call) in (f"float({code})", f"int({code})"):
+            return Clue(f"{source.code(call)} does not change {code}: write {code} = float({code})", source.place(call))
+    value = sole_assignment(source, side) if isinstance(side, ast.Name) else None
+    whole = value or side
+    if isinstance(whole, ast.Attribute) and whole.attr == "message":
+        hint = f"{source.code(whole, 60)} is a whole text: take the number out of it, and convert it with float(...)"
+        return Clue(hint, source.place(whole))
+    if isinstance(value, (ast.Call, ast.Subscript)) and _is_only_compared(source, side):
+        right = _inside(source, value) if _made_by(value, "str") else f"float({source.code(value, 60)})"
+        return Clue(f"{code} is a string: write {code} = {right}", source.place(value))
+    if value is None or isinstance(value, (ast.Call, ast.Subscript)):
+        return Clue(f"{code} is a string: write float({code}) to compare it with a number")
+    return None
+
+
+def _made_by(node: ast.expr, *names: str) -> bool:
+    """Return whether an expression is a call of a conversion, such as `str(x)`."""
+    return isinstance(node, ast.Call) and chain(node.func) in names and len(node.args) == 1
+
+
+def _inside(source: Source, call: ast.expr) -> str:
+    """Return the code of the only argument of a call."""
+    return source.code(call.args[0], 60) if isinstance(call, ast.Call) else ""
+
+
+def _is_only_compared(source: Source, name: ast.expr) -> bool:
+    """Return whether a variable is compared or shown wherever its function reads it, and never used as a text."""
+    function = source.function_of(name)
+    reads = [n for n in source.all(ast.Name) if chain(n) == chain(name) and isinstance(n.ctx, ast.Load)]
+    here = [source.parents.get(n) for n in reads if source.function_of(n) is function]
+    shown = (ast.Compare, ast.FormattedValue, ast.Tuple)
+    return all(isinstance(n, shown) or (isinstance(n, ast.BinOp) and isinstance(n.op, ast.Mod)) for n in here)
 
 
 @crash_rule(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from grader.grading.judging.diagnosis.names import SPINS
+from grader.grading.judging.diagnosis.names import MESSAGE_FIELDS, SPINS
 from grader.grading.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.grading.judging.diagnosis.wiring import (
     callback_nodes,
@@ -268,7 +268,7 @@ def _future_is_no_answer(crash: Crash) -> Clue | None:
     r"'(\w+)_Request' object has no attribute '(\w+)'|'(\w+)_Response' object has no attribute '(\w+)'", priority=3100
 )
 def _request_is_response(crash: Crash) -> Clue | None:
-    """The callback of a service names its parameters in the wrong order."""
+    """The request of a service is taken for its response: swapped parameters, or a field of the other one."""
     source = crash.source
     for call in _ends(source, "service"):
         for function in roots(source, argument(call, 2, "callback")):
@@ -280,7 +280,35 @@ def _request_is_response(crash: Crash) -> Clue | None:
                     wanted = ", ".join([*own, pair[1], pair[0]])
                     hint = f"a service passes the request first: def {function.name}({wanted}):"
                     return Clue(hint, source.place(function))
-    return None
+    return _other_half(crash)
+
+
+def _other_half(crash: Crash) -> Clue | None:
+    """`request.success`: the field is one of the response, or the other way round."""
+    source, (request, asked, response, answered) = crash.source, crash.found.groups()
+    service, field, other = (request, asked, "Response") if request else (response, answered, "Request")
+    if field not in MESSAGE_FIELDS.get(f"{service}_{other}", ()):
+        return None
+    function, hint = source.function_at(crash.line), f"{field} is a field of the {other.lower()}"
+    for call in _ends(source, "service"):
+        callbacks = roots(source, argument(call, 2, "callback"))
+        names = parameters(function) if function is not None and function in callbacks else []
+        if len(names) > 1:
+            return Clue(f"{hint}: write {names[-1] if other == 'Response' else names[-2]}.{field}")
+    answers = {target for c in source.calls("result", "call") if (target := _assigned(source, c, function))}
+    waited = (c for c in source.calls("call_async") if isinstance(source.parents.get(c), ast.Await))
+    answers |= {target for c in waited if (target := _assigned(source, source.parents[c], function))}
+    if other == "Response" and len(answers) == 1:
+        return Clue(f"{hint}: write {answers.pop()}.{field}")
+    return Clue(hint)
+
+
+def _assigned(source: Source, value: ast.AST, function: Function | None) -> str:
+    """Return the variable of a function that a value is assigned to; empty if there is none."""
+    statement = source.parents.get(value)
+    if not isinstance(statement, ast.Assign) or source.function_of(statement) is not function:
+        return ""
+    return chain(statement.targets[0])
 
 
 @crash_rule(priority=3110)

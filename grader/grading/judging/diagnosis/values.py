@@ -35,6 +35,8 @@ _DRAWS = words(
 )
 #: Functions that convert an angle.
 _TO_DEGREES, _TO_RADIANS = ("degrees", "rad2deg"), ("radians", "deg2rad")
+#: What assigns the result of an operator.
+_SIGNS: dict[type[ast.operator], str] = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*=", ast.Div: "/="}
 #: How many levels of an expression around a random draw are followed.
 _DEEPEST = 12
 
@@ -478,6 +480,25 @@ def _counts_by_another_step(case: Case) -> Clue | None:
     return None
 
 
+@hint_rule("field_function", "service_sequence", priority=10138)
+def _result_thrown_away(case: Case) -> Clue | None:
+    """`self.count + 1` as a statement, for `+=`, or `self.count == 0`, for `=`."""
+    for source in case.sources.values():
+        for statement in source.all(ast.Expr):
+            value = statement.value
+            if isinstance(value, ast.BinOp) and isinstance(value.left, (ast.Name, ast.Attribute)):
+                sign, right, does = _SIGNS.get(type(value.op), ""), value.right, "changes"
+            elif isinstance(value, ast.Compare) and isinstance(value.left, (ast.Name, ast.Attribute)):
+                sign = "=" if len(value.ops) == 1 and isinstance(value.ops[0], ast.Eq) else ""
+                right, does = value.comparators[0], "sets"
+            else:
+                continue
+            if sign:
+                instead = f"{source.code(value.left)} {sign} {source.code(right, 40)}"
+                return Clue(f"{source.code(value)} {does} nothing: write {instead}", source.place(statement))
+    return None
+
+
 @hint_rule("field_function", priority=10140)
 def _counter_never_changes(case: Case) -> Clue | None:
     """The counter never changes."""
@@ -486,7 +507,9 @@ def _counter_never_changes(case: Case) -> Clue | None:
         return None
     for counter in _counters(case):
         if all(case.source.function_name(s) == "__init__" for s in case.source.stores(counter)):
-            return Clue(f"{counter} never changes: write {counter} += 1 after each message")
+            sends = list(case.source.calls("publish"))
+            place = case.source.place(sends[0]) if len(sends) == 1 else None
+            return Clue(f"{counter} never changes: write {counter} += 1 after each message", place)
     return None
 
 
