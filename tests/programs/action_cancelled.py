@@ -16,7 +16,7 @@ class Cancels(Node):
         future = self.client.send_goal_async(Fibonacci.Goal(order=9), goal_uuid=UUID(uuid=list(range(16))))
         rclpy.spin_until_future_complete(self, future)
         handle = future.result()
-        print("goal", list(handle.goal_id.uuid)[:4], flush=True)
+        print("goal", [int(n) for n in handle.goal_id.uuid[:4]], flush=True)
         timer = self.create_timer(0.7, lambda: (timer.cancel(), self.cancel(handle)))
         result = handle.get_result_async()
         rclpy.spin_until_future_complete(self, result)

@@ -159,9 +159,8 @@ class _Reader:
             raise UnfitTree
         if kind.placed and (len(places) != 4 or not all(type(p) is int and 0 <= p < _MOST_PLACE for p in places)):
             raise UnfitTree
-        made = kind.made()
-        for field, value in zip(kind.fields, values, strict=True):
-            setattr(made, field.name, self._value(field, value, depth))
+        named = {f.name: self._value(f, value, depth) for f, value in zip(kind.fields, values, strict=True)}
+        made = kind.made(**named)
         if kind.placed:
             made.lineno, made.col_offset, made.end_lineno, made.end_col_offset = places  # type: ignore[attr-defined]
         return made
