@@ -495,6 +495,7 @@ def repeated(tests: Path) -> list[list[str]]:
     return [places for places in found.values() if len(places) > 1]
 
 
+@pytest.mark.long
 def test_helpers_have_one_home() -> None:
     """No two modules define the same helper, and none takes one out of a module of tests."""
     assert repeated(TESTS) == []

@@ -20,7 +20,7 @@ def test_a_module_breaks_what_imports_it() -> None:
     assert "course/classroom/test_roster.py" not in found
 
 
-@pytest.mark.breadth(1, 3)
+@pytest.mark.breadth(0, 3)
 @pytest.mark.parametrize(
     "module", ["grader/runtime/host/clock.py", "grader/runtime/worker/core.py", "grader/runtime/sandbox/probe.py"]
 )
@@ -30,17 +30,20 @@ def test_what_runs_in_another_process_breaks_what_starts_it(module: str) -> None
     assert {"runtime/host/test_clock_for_real.py", "cli/test_end_to_end.py", "world/test_world.py"} <= set(found)
 
 
+@pytest.mark.long
 def test_a_module_breaks_what_reads_its_folder() -> None:
     """A test may import it by its place, and others look into all sources."""
     found = named("grader/runtime/host/ledger.py")
     assert {"runtime/host/test_ledger_arrivals.py", "test_architecture.py"} <= set(found)
 
 
+@pytest.mark.long
 def test_a_module_breaks_the_tests_of_programs_that_name_it() -> None:
     """Such as pytest with the grader's plugin."""
     assert {"world/test_plugin.py", "world/test_races.py"} <= set(named("grader/pytest_plugin.py"))
 
 
+@pytest.mark.long
 def test_a_helper_breaks_the_tests_that_import_it() -> None:
     """However many helpers are between them."""
     found = named("tests/support/tracing.py")
@@ -48,6 +51,7 @@ def test_a_helper_breaks_the_tests_that_import_it() -> None:
     assert "runtime/sandbox/test_isolation.py" not in found
 
 
+@pytest.mark.long
 def test_a_table_breaks_the_tests_of_its_folder() -> None:
     """A folder below `tests/` and the one in it."""
     found = named("tests/grading/judging/diagnosis/slips.yaml")
@@ -55,7 +59,7 @@ def test_a_table_breaks_the_tests_of_its_folder() -> None:
     assert {path.split("/")[0] for path in found} == {"grading"}
 
 
-@pytest.mark.breadth(1, 5)
+@pytest.mark.breadth(0, 5)
 @pytest.mark.parametrize(
     ("path", "tests"),
     [

@@ -178,6 +178,7 @@ def test_a_message_explained_still_exists(message: str) -> None:
     assert _exists(message)
 
 
+@pytest.mark.long
 def test_a_message_that_nothing_says_is_found() -> None:
     """The comparison can fail, and the table is read at all."""
     assert not _exists("the robot ... is sad")

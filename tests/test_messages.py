@@ -91,6 +91,7 @@ def test_no_message_sounds_translated() -> None:
     assert wrong == []
 
 
+@pytest.mark.long
 def test_no_docstring_or_comment_sounds_translated() -> None:
     """In the grader, the exercises that come with it, and the benchmarks."""
     files = sorted(path for folder in ("grader", "rubrics", "benchmarks") for path in (ROOT / folder).rglob("*.py"))

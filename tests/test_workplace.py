@@ -68,6 +68,7 @@ def test_every_place_of_a_report_becomes_clickable(task: dict[str, Any], folder:
     assert all(message.strip() for message in places.values())
 
 
+@pytest.mark.long
 def test_enough_places_are_tried() -> None:
     """The test above compares more than empty sets."""
     assert sum(len(wanted(report_of(folder))) for folder in WRONG) > 20

@@ -107,6 +107,7 @@ def test_an_untouched_arena_has_nothing_to_tell(arena: Arena) -> None:
     assert texts(arena, NOTHING) == []
 
 
+@pytest.mark.long
 def test_the_secret_is_found_wherever_the_grader_wrote_it(arena: Arena) -> None:
     """In any file of the report, and on either stream."""
     leaks = [

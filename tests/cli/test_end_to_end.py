@@ -59,7 +59,7 @@ def of_this_python(verdict: Mapping[str, str]) -> dict[str, str]:
     return {key: text.replace("(read by Python 3.11)", f"(read by {here})") for key, text in verdict.items()}
 
 
-@pytest.mark.breadth(3, 6)
+@pytest.mark.breadth(2, 6)
 @pytest.mark.parametrize("folder", list(live()))
 def test_a_submission_gets_what_it_is_worth(folder: str) -> None:
     """A correct node loses nothing however it is written; a wrong one loses what it got wrong."""

@@ -21,7 +21,7 @@ def test_every_submission_is_recorded() -> None:
     assert set(recordings()) == set(expected())
 
 
-@pytest.mark.breadth(90, 530)
+@pytest.mark.breadth(45, 600)
 @pytest.mark.parametrize("folder", expected())
 def test_a_recording_is_judged_as_ever(folder: str) -> None:
     """The outcome of every criterion, what the student reads, and the whole report."""
@@ -41,6 +41,7 @@ def test_a_recording_is_drawn_as_ever(folder: str) -> None:
     assert render_html(report) == render_html(judged(recordings()[folder]))
 
 
+@pytest.mark.long
 def test_the_archive_is_written_as_it_was_read(tmp_path: Path) -> None:
     """The same recordings, the same bytes."""
     some = {folder: one for folder, one in recordings().items() if folder.startswith("broken/")}

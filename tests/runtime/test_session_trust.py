@@ -44,7 +44,7 @@ def test_every_program_is_listed() -> None:
     assert {p["folder"] for p in PROGRAMS} == {path.name for path in HERE.iterdir() if path.is_dir()}
 
 
-@pytest.mark.breadth(2, 1)
+@pytest.mark.breadth(1, 1)
 @pytest.mark.ros
 @pytest.mark.parametrize(
     "program",

@@ -26,7 +26,7 @@ def test_who_knows_the_key_knows_the_questions() -> None:
     assert logged(PRACTICE) == "met"
 
 
-@pytest.mark.breadth(1, 1)
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize("key", [b"a key of some class", b"the key of another class"])
 def test_without_the_key_of_the_class_nobody_knows_them(key: bytes) -> None:
     """The files are the same, the values are not."""

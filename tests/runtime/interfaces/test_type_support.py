@@ -256,6 +256,7 @@ print([os.waitpid(child, 0)[1] for child in children])
 """
 
 
+@pytest.mark.long
 def test_works_in_processes_forked_after_its_first_use(built: BuiltInterfaces) -> None:
     assert run(FORKED, built).strip() == "[0, 0]"
 

@@ -348,6 +348,7 @@ else:
 """
 
 
+@pytest.mark.long
 def test_a_later_start_finds_no_connection(run: Callable[..., Trace]) -> None:
     """The kernel keeps the port of a closed TCP connection for a minute, so the network is not used again."""
     for _ in range(3):

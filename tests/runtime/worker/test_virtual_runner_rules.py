@@ -214,6 +214,7 @@ def test_before_a_process_leaves_what_it_has_sent_is_recorded_and_has_arrived() 
     assert [m.value["data"] for m in run.trace.messages("/x")] == [5]
 
 
+@pytest.mark.long
 @pytest.mark.rule(17)
 def test_what_has_sent_is_kept_alive_until_its_messages_have_arrived() -> None:
     """Nobody else holds it any more."""

@@ -90,7 +90,7 @@ def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(
     assert run(once, later).clock_reason.startswith(OUTSIDE)  # and then what the program did, at which line
 
 
-@pytest.mark.breadth(1, 1)
+@pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize(("once", "later"), but([WORK["computing"]], WORK.values()), ids=WORK)
 def test_long_computing_is_for_the_wall_clock(run: Callable[..., Trace], once: str, later: str) -> None:
     assert run(once, later).clock_reason == BUSY

@@ -107,6 +107,7 @@ def traces_of(row: Row) -> dict[str, Trace]:
     return crash_traces(row) if "fault" in row else behaviour_traces(row)
 
 
+@pytest.mark.long
 def test_diagnosis_changes_neither_outcomes_nor_points_nor_reasons() -> None:
     """With the sources and without them, the same is earned for the same reason."""
 
