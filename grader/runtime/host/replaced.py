@@ -75,11 +75,14 @@ def rename_functions() -> None:
             if not _is_own(value):
                 continue
             original = _IN_C.get((module.__name__, name))
-            if original is not None:
-                shown = made.setdefault((id(value), id(original)), _Builtin(value, original))
+            shown = made.setdefault((id(value), id(original)), _Builtin(value, original))
+            home, called = sys.modules.get(getattr(original, "__module__", "")), getattr(original, "__name__", "")
+            there = getattr(home, called, None)
+            # Where another function stands in the module that the original is from, as for `queue.time`, what shows
+            # itself as the original could not be pickled.
+            if original is not None and any(there is each for each in (original, value, shown)):
                 setattr(module, name, shown)
-                home, called = sys.modules[original.__module__], original.__name__  # such as `posix`
-                if vars(home).get(called) is original:
+                if there is original:  # in a module such as `posix`
                     setattr(home, called, shown)
             elif getattr(sys.modules.get(value.__module__), value.__name__, None) is not value:
                 value.__module__, value.__name__, value.__qualname__ = module.__name__, name, name
