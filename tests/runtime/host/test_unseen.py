@@ -51,6 +51,8 @@ for text in json.load(sys.stdin):
         os._exit(0)
     os.wait()
 """
+#: Newer releases warn of a fork beside threads.
+PYTHON = (sys.executable, "-s", "-W", "ignore::DeprecationWarning", "-c")
 #: Packages of which the starter itself needs parts, before anything is noted.
 OF_STARTER = ("collections", "importlib", "json", "typing")
 
@@ -64,7 +66,7 @@ def test_a_program_sees_the_modules_that_it_sees_in_plain_python() -> None:
     """Not `rclpy.node` after `import rclpy`, and all that each import brings with it."""
     launcher = ROOT / "grader" / "runtime" / "host" / "launcher.py"
     done = subprocess.run(
-        [sys.executable, "-s", "-c", STARTER, str(launcher)],
+        [*PYTHON, STARTER, str(launcher)],
         input=json.dumps([program + SHOWN for program in PROGRAMS]),
         check=True,
         capture_output=True,
@@ -72,8 +74,6 @@ def test_a_program_sees_the_modules_that_it_sees_in_plain_python() -> None:
     )
     assert done.stderr == ""
     for program, line in zip(PROGRAMS, done.stdout.splitlines(), strict=True):
-        plain = subprocess.run(
-            [sys.executable, "-s", "-c", program + SHOWN], check=True, capture_output=True, text=True
-        )
+        plain = subprocess.run([*PYTHON, program + SHOWN], check=True, capture_output=True, text=True)
         assert (program, shown(line)) == (program, shown(plain.stdout))
     assert "rclpy.node" not in shown(done.stdout.splitlines()[0])
