@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
-from tiers import spread
+from tiers import spread, tier_of
 
 TABLES = {(1, 1): (1, 1, 20), (4, 6): (4, 6, 12), (7, 0): (7, 0, 15), (0, 5): (0, 5, 17), (50, 50): (20, 1, 1)}
 TABLE = """
@@ -21,10 +21,6 @@ def test_other(n): ...
 """
 
 
-def tier_of(item: pytest.Item) -> str:
-    return next((name for name in ("nightly", "long") if item.get_closest_marker(name)), "default")
-
-
 def test_a_table_gives_so_many_rows_to_each_tier(pytester: pytest.Pytester) -> None:
     """Those of a tier are spread over the table, and no other table gives any."""
     tables = "".join(TABLE.format(default=default, long=long) for default, long in TABLES)
@@ -32,9 +28,9 @@ def test_a_table_gives_so_many_rows_to_each_tier(pytester: pytest.Pytester) -> N
     spread(items)
     found = Counter((item.name.partition("[")[0], tier_of(item)) for item in items)
     for (default, long), expected in TABLES.items():
-        assert tuple(found[f"test_{default}_{long}", tier] for tier in ("default", "long", "nightly")) == expected
-    assert found["test_other", "default"] == 3
-    first = [item.name for item in items if item.name.startswith("test_4_6") and tier_of(item) == "default"]
+        assert tuple(found[f"test_{default}_{long}", tier] for tier in ("", "long", "nightly")) == expected
+    assert found["test_other", ""] == 3
+    first = [item.name for item in items if item.name.startswith("test_4_6") and tier_of(item) == ""]
     assert first == [f"test_4_6[{n}]" for n in (0, 5, 10, 15)]
 
 

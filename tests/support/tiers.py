@@ -56,12 +56,13 @@ def spread(items: list[pytest.Item]) -> None:
         marker = rows[0].get_closest_marker("breadth")
         assert marker is not None
         for count, tier, later in zip(marker.args, ("", "long"), ("long", "nightly"), strict=True):
-            there = [row for row in rows if _tier(row) == tier]
+            there = [row for row in rows if tier_of(row) == tier]
             share = count / max(len(there), 1)
             for number, row in enumerate(there):
                 if not count or (number and int(number * share) == int((number - 1) * share)):
                     row.add_marker(later)
 
 
-def _tier(item: pytest.Item) -> str:
+def tier_of(item: pytest.Item) -> str:
+    """Return the tier that the markers of a test leave it to; empty for the default one."""
     return next((name for name in ("nightly", "long") if item.get_closest_marker(name)), "")

@@ -75,17 +75,30 @@ def rename_functions() -> None:
             if not _is_own(value):
                 continue
             original = _IN_C.get((module.__name__, name))
-            shown = made.setdefault((id(value), id(original)), _Builtin(value, original))
-            home, called = sys.modules.get(getattr(original, "__module__", "")), getattr(original, "__name__", "")
-            there = getattr(home, called, None)
-            # Where another function stands in the module that the original is from, as for `queue.time`, what shows
-            # itself as the original could not be pickled.
-            if original is not None and any(there is each for each in (original, value, shown)):
+            shown = None if original is None else _shown(value, original, made)
+            if shown is not None:
                 setattr(module, name, shown)
-                if there is original:  # in a module such as `posix`
-                    setattr(home, called, shown)
             elif getattr(sys.modules.get(value.__module__), value.__name__, None) is not value:
                 value.__module__, value.__name__, value.__qualname__ = module.__name__, name, name
+
+
+def _shown(value: Any, original: Any, made: dict[tuple[int, int], Any]) -> Any:
+    """Return what shows a function of this package as the one in C that it replaces.
+
+    None where another function stands in the module that the original is from, as for `queue.time`: it could not be
+    pickled by the name of the original.
+
+    Args:
+        value: The function of this package.
+        original: The function in C.
+        made: What shows the pairs before, to which this one is added.
+    """
+    home, called = sys.modules[original.__module__], original.__name__
+    there = getattr(home, called, None)
+    shown = made.setdefault((id(value), id(original)), _Builtin(value, original))
+    if there is original:  # in a module such as `posix`
+        setattr(home, called, shown)
+    return shown if any(there is each for each in (original, value, shown)) else None
 
 
 def guard_methods(modules: Iterable[str]) -> None:

@@ -50,32 +50,22 @@ NAMES: Mapping[str, str] = {
         "get_packages_with_prefixes get_resource get_resources get_search_paths"
     ),
 }
+_OF_PROCESSES = (
+    "prefix cwd env additional_env shell sigterm_timeout sigkill_timeout emulate_tty output output_format "
+    "cached_output log_cmd on_exit respawn respawn_delay respawn_max_retries condition"
+)
+_OF_NODES = "name namespace executable package exec_name parameters remappings ros_arguments arguments " + _OF_PROCESSES
 #: What the constructors of some of them take.
 TAKES: Mapping[str, str] = {
-    "Node": (
-        "executable package name namespace exec_name parameters remappings ros_arguments arguments prefix cwd env "
-        "additional_env shell sigterm_timeout sigkill_timeout emulate_tty output output_format cached_output "
-        "log_cmd on_exit respawn respawn_delay respawn_max_retries condition"
-    ),
-    "LifecycleNode": (
-        "name namespace executable package exec_name parameters remappings ros_arguments arguments prefix cwd env "
-        "additional_env shell sigterm_timeout sigkill_timeout emulate_tty output output_format cached_output "
-        "log_cmd on_exit respawn respawn_delay respawn_max_retries condition"
-    ),
+    "Node": _OF_NODES,
+    "LifecycleNode": _OF_NODES,
+    "ComposableNodeContainer": f"composable_node_descriptions {_OF_NODES}",
+    "ExecuteProcess": f"cmd name {_OF_PROCESSES}",
     "DeclareLaunchArgument": "name default_value description choices condition",
     "IncludeLaunchDescription": "launch_description_source launch_arguments condition",
-    "ExecuteProcess": (
-        "cmd prefix name cwd env additional_env shell sigterm_timeout sigkill_timeout emulate_tty output "
-        "output_format cached_output log_cmd on_exit respawn respawn_delay respawn_max_retries condition"
-    ),
     "TimerAction": "period actions cancel_on_shutdown condition",
     "GroupAction": "actions scoped forwarding launch_configurations condition",
     "RegisterEventHandler": "event_handler condition",
-    "ComposableNodeContainer": (
-        "name namespace executable composable_node_descriptions package exec_name parameters remappings "
-        "ros_arguments arguments prefix cwd env additional_env shell sigterm_timeout sigkill_timeout emulate_tty "
-        "output output_format cached_output log_cmd on_exit respawn respawn_delay respawn_max_retries condition"
-    ),
     "OnProcessExit": "on_exit target_action handle_once",
     "OnProcessStart": "on_start target_action handle_once",
 }

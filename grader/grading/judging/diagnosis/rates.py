@@ -6,7 +6,16 @@ import ast
 import math
 from collections.abc import Iterable, Sequence
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, lines_of, rounded_down, silent_topic
+from grader.grading.judging.diagnosis.rules import (
+    SAME_PACE,
+    Case,
+    Clue,
+    hint_rule,
+    lines_of,
+    rounded_down,
+    same_pace,
+    silent_topic,
+)
 from grader.grading.judging.diagnosis.wiring import (
     Constant,
     Made,
@@ -33,9 +42,6 @@ from grader.grading.judging.source import Loop, Source, argument, chain, first_l
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
-
-#: Largest relative difference between the rate in the text and the measured one.
-_SAME = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +77,6 @@ def _paced(case: Case) -> _Paced | None:
     return _Paced(case, case.source, calls, check.rate, facts)
 
 
-def _same(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=_SAME)
-
-
 @hint_rule(priority=9005)
 def _timer_made_again(case: Case) -> Clue | None:
     """A callback creates a timer each time it runs, and none is stopped."""
@@ -99,13 +101,13 @@ def _period(paced: _Paced) -> Clue | None:
     if len(timers) != 1:
         return None
     worth = constant(paced.source, timers[0].period)
-    if worth is None or _same(worth.value, paced.period_s):
+    if worth is None or same_pace(worth.value, paced.period_s):
         return None
     if worth.value == 0:
         hint = f"{timer_code(paced.source, timers[0])} has a period of 0 s: write {number(paced.period_s)}"
         return rounded_down(paced.source, timers[0], paced.period_s) or Clue(hint, paced.source.place(worth.origin))
-    explains = _same(1 / worth.value, paced.found_hz) or (
-        paced.facts.count <= 2 and _same(worth.value, paced.facts.first_s)
+    explains = same_pace(1 / worth.value, paced.found_hz) or (
+        paced.facts.count <= 2 and same_pace(worth.value, paced.facts.first_s)
     )
     return _period_clue(paced.source, timers[0], worth, paced.wanted_hz) if explains else None
 
@@ -113,9 +115,9 @@ def _period(paced: _Paced) -> Clue | None:
 def _period_clue(source: Source, timer: Made, worth: Constant, wanted_hz: float) -> Clue:
     wanted_s = number(1 / wanted_hz)
     is_ = f"{timer_code(source, timer)} fires every {number(worth.value)} s"
-    if _same(worth.value, wanted_hz):
+    if same_pace(worth.value, wanted_hz):
         hint = f"{is_}: {number(worth.value)} is the rate, the period is 1/{number(wanted_hz)} = {wanted_s} s"
-    elif _same(worth.value, 1000 / wanted_hz):
+    elif same_pace(worth.value, 1000 / wanted_hz):
         hint = f"{is_}: the period is in seconds, not milliseconds: write {wanted_s}"
     else:
         rate = number(1 / worth.value)
@@ -136,7 +138,7 @@ def _callback_held_up(paced: _Paced) -> Clue | None:
                 return Clue(f"{hint}: let the timer call it again instead", paced.source.place(node))
         sleeps = _sleeps(paced.source, runs(paced.source, timer))
         total = sum(s.value for s in sleeps)
-        if sleeps and total > paced.period_s and _same(1 / total, paced.found_hz):
+        if sleeps and total > paced.period_s and same_pace(1 / total, paced.found_hz):
             call = sleeps[0].origin
             hint = f"{paced.source.code(call)} blocks the callback: remove it, because the timer sets the pace"
             return Clue(hint, paced.source.place(call))
@@ -240,7 +242,7 @@ def _stopped_itself(paced: _Paced) -> Clue | None:
 @hint_rule("topic_rate", given=_paced, priority=9055)
 def _held_up_beside_spinning(paced: _Paced) -> Clue | None:
     """A loop sleeps between two calls of spin_once, so that the timer fires as rarely as the loop turns."""
-    if not paced.timers() or not paced.found_hz < (1 - _SAME) * paced.wanted_hz:
+    if not paced.timers() or not paced.found_hz < (1 - SAME_PACE) * paced.wanted_hz:
         return None
     for pause in pauses(paced.source):
         if pause.spun is not None and pause.seconds is not None and pause.seconds > 0.5 * paced.period_s:
@@ -253,7 +255,7 @@ def _too_slow(paced: _Paced) -> Clue | None:
     """The period is right, but the rate is too low."""
     timers = paced.timers()
     worth = constant(paced.source, timers[0].period) if len(timers) == 1 else None
-    if worth is None or not _same(worth.value, paced.period_s):
+    if worth is None or not same_pace(worth.value, paced.period_s):
         return None
     if math.isnan(paced.found_hz) or paced.found_hz > 0.97 * paced.wanted_hz:
         return None
@@ -265,7 +267,7 @@ def _too_slow(paced: _Paced) -> Clue | None:
 @hint_rule("topic_rate", given=_paced, priority=9070)
 def _waits_to_spin(paced: _Paced) -> Clue | None:
     """A loop that publishes spins once without a timeout, which waits until something wakes the node."""
-    rare = math.isnan(paced.found_hz) or paced.found_hz < (1 - _SAME) * paced.wanted_hz
+    rare = math.isnan(paced.found_hz) or paced.found_hz < (1 - SAME_PACE) * paced.wanted_hz
     if paced.timers() or not rare:
         return None
     source = paced.source
@@ -288,7 +290,7 @@ def _loop_pace(paced: _Paced) -> Clue | None:
     source = paced.source
     rates = list(source.calls("create_rate", "Rate"))
     worth = constant(source, argument(rates[0], 0, "frequency")) if len(rates) == 1 else None
-    if worth is not None and _same(worth.value, paced.found_hz) and not _same(worth.value, paced.wanted_hz):
+    if worth is not None and same_pace(worth.value, paced.found_hz) and not same_pace(worth.value, paced.wanted_hz):
         hint = f"{source.code(rates[0])} is {number(worth.value)} Hz; {number(paced.wanted_hz)} Hz is required"
         return Clue(hint, source.place(worth.origin))
     loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
@@ -302,7 +304,7 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
     if not pauses:
         return _no_pause(paced, loop)
     call = pauses[0].origin
-    if _same(1 / total, paced.found_hz) and not _same(total, paced.period_s):
+    if same_pace(1 / total, paced.found_hz) and not same_pace(total, paced.period_s):
         codes = " and ".join(dict.fromkeys(source.code(p.origin) for p in pauses))
         hint = f"{codes} give{'s' if len(pauses) == 1 else ''} {number(1 / total)} Hz"
         in_all = " in all" if len(pauses) > 1 else ""
@@ -312,7 +314,7 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
     if spun is not None and paced.found_hz > 1.03 / total and (made(source, "timer", "subscription")):
         hint = f"{source.code(spun)} returns as soon as a message arrives, so it is not a pause"
         return Clue(f"{hint}: let a timer publish, create_timer({wanted}, ...), and call spin", source.place(spun))
-    if _same(total, paced.period_s) and 0.7 * paced.wanted_hz < paced.found_hz < paced.wanted_hz:
+    if same_pace(total, paced.period_s) and 0.7 * paced.wanted_hz < paced.found_hz < paced.wanted_hz:
         hint = f"{source.code(call)} adds to the time of the rest of the loop: publish from a timer"
         return Clue(f"{hint}, create_timer({wanted}, ...)", source.place(call))
     return None

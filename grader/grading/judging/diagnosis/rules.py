@@ -27,8 +27,8 @@ NO_SOURCE = Source("")
 _ANYTHING = re.compile("")
 #: The place of a rule of a rubric's own, unless it says another: before all rules of the grader, which begin at 1000.
 FIRST = 100
-#: Largest relative difference of two periods that are taken for the same.
-_SAME_PERIOD = 0.03
+#: Largest relative difference of two rates or periods that are taken for the same.
+SAME_PACE = 0.03
 Given = TypeVar("Given")
 
 
@@ -316,6 +316,11 @@ def log_call(case: Case) -> ast.Call | None:
     return logs[0] if len(logs) == 1 else None
 
 
+def same_pace(one: float, other: float) -> bool:
+    """Return whether two rates or two periods, in the text or measured, are taken for the same."""
+    return math.isclose(one, other, rel_tol=SAME_PACE)
+
+
 def rounded_down(source: Source, timer: Made, period_s: float) -> Clue | None:
     """Return a clue if an integer division, or `int`, makes 0 of a period."""
     value = value_of(source, timer.period)
@@ -329,7 +334,7 @@ def rounded_down(source: Source, timer: Made, period_s: float) -> Clue | None:
             period = number_in_code(source, node.args[0]) or 0.0
         else:
             continue
-        better = right if math.isclose(period, period_s, rel_tol=_SAME_PERIOD) else number(period_s)
+        better = right if same_pace(period, period_s) else number(period_s)
         return Clue(f"{source.code(node, 40)} is 0, because {why}: write {better}", source.place(node))
     return None
 

@@ -295,20 +295,12 @@ def _other_half(crash: Crash) -> Clue | None:
         names = parameters(function) if function is not None and function in callbacks else []
         if len(names) > 1:
             return Clue(f"{hint}: write {names[-1] if other == 'Response' else names[-2]}.{field}")
-    answers = {target for c in source.calls("result", "call") if (target := _assigned(source, c, function))}
-    waited = (c for c in source.calls("call_async") if isinstance(source.parents.get(c), ast.Await))
-    answers |= {target for c in waited if (target := _assigned(source, source.parents[c], function))}
+    waited = (source.parents.get(call) for call in source.calls("call_async"))
+    values = [*source.calls("result", "call"), *(value for value in waited if isinstance(value, ast.Await))]
+    answers = {target_of(source, value) for value in values if source.function_of(value) is function} - {""}
     if other == "Response" and len(answers) == 1:
         return Clue(f"{hint}: write {answers.pop()}.{field}")
     return Clue(hint)
-
-
-def _assigned(source: Source, value: ast.AST, function: Function | None) -> str:
-    """Return the variable of a function that a value is assigned to; empty if there is none."""
-    statement = source.parents.get(value)
-    if not isinstance(statement, ast.Assign) or source.function_of(statement) is not function:
-        return ""
-    return chain(statement.targets[0])
 
 
 @crash_rule(priority=3110)
