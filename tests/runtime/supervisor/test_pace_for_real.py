@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiers import LONG, NIGHTLY
+from tiers import NIGHTLY, but
 
 from grader.runtime.model.trace import ClockKind, Trace
 from grader.runtime.session import AUTO, CHARGED_NOTE, DRIFTS, VIRTUAL, RecordingSession
@@ -135,8 +135,6 @@ async def main():
 asyncio.run(main())
 """,
 }
-#: One of each kind is tested by default, and two with `--long`.
-ALWAYS, OFTEN = {"look", "deadline"}, {"asyncio", "rest"}
 Record = Callable[..., Trace]
 
 
@@ -157,28 +155,21 @@ def rate_hz(trace: Trace) -> float:
     return (len(times) - 1) / (times[-1] - times[0]) * NS_PER_S
 
 
-def of_each(programs: dict[str, str]) -> list[object]:
-    marks = {name: () if name in ALWAYS else (LONG,) if name in OFTEN else (NIGHTLY,) for name in programs}
-    return [pytest.param(program, id=name, marks=marks[name]) for name, program in programs.items()]
-
-
-@pytest.mark.nightly
-@pytest.mark.breadth(0, 1)
-@pytest.mark.parametrize("program", of_each(RELATIVE))
-def test_a_loop_that_pauses_after_its_work_is_as_slow_as_it_is(run: Record, program: str) -> None:
+@pytest.mark.long
+@pytest.mark.parametrize("name", but(("condition",), RELATIVE, NIGHTLY))
+def test_a_loop_that_pauses_after_its_work_is_as_slow_as_it_is(run: Record, name: str) -> None:
     """20 ms of work and a pause of 50: 14 Hz, by the wall clock, or by the measured work if the machine is too busy."""
-    trace = run(program)
+    trace = run(RELATIVE[name])
     assert rate_hz(trace) < 16
     assert trace.clock is ClockKind.VIRTUAL or trace.clock_reason in (DRIFTS, BUSY, OUTSIDE)
     assert trace.clock is ClockKind.WALL or CHARGED_NOTE in trace.notes
 
 
-@pytest.mark.breadth(0, 1)
 @pytest.mark.long
-@pytest.mark.parametrize("program", of_each(UNTIL))
-def test_a_loop_that_sleeps_until_a_deadline_keeps_its_pace(run: Record, program: str) -> None:
+@pytest.mark.parametrize("name", but(("deadline",), UNTIL, NIGHTLY))
+def test_a_loop_that_sleeps_until_a_deadline_keeps_its_pace(run: Record, name: str) -> None:
     """It makes up for its work: it stays in virtual time, at exactly 20 Hz."""
-    trace = run(program)
+    trace = run(UNTIL[name])
     assert (trace.clock, trace.clock_reason, trace.notes) == (ClockKind.VIRTUAL, "", ())
     assert f"{rate_hz(trace):.3f}" == "20.000"
 
