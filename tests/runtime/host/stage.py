@@ -54,6 +54,18 @@ class Stage:
         self.say(text)
         self.time.scheduler.wrote()
 
+    def work(self, ms: int) -> None:
+        """Have the work before the program's next wait take so long, as if it had been measured."""
+        clock, scheduler = self.time.clock, self.time.scheduler
+
+        def charge() -> None:
+            clock.charge = lambda: None
+            end_ns = clock.now_ns + ms * 1_000_000
+            while clock.now_ns < end_ns:
+                scheduler.pause(end_ns)
+
+        clock.charge = charge
+
     @staticmethod
     def fault(error: BaseException) -> Any:
         """Return what ended a thread."""
@@ -96,7 +108,7 @@ def perform(request: dict[str, Any], pipe: int) -> None:
             stand_in_for_ros(stage.say)
             entry.run_file(request, stage.note, lambda: stage.say("ros"))
         else:
-            names = {"__name__": "__main__", "say": stage.say, "write": stage.write}
+            names = {"__name__": "__main__", "say": stage.say, "write": stage.write, "work": stage.work}
             exec(compile(request["code"], "program", "exec"), names)
     except SystemExit as leaving:
         stage.say(f"exit {program.exit_code(leaving)}")

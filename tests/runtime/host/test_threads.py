@@ -328,6 +328,33 @@ def test_a_lock_goes_to_whoever_has_waited_longest() -> None:
     ]
 
 
+@pytest.mark.rule(5)
+@pytest.mark.parametrize(
+    ("made", "wait", "wake"),
+    [
+        ("threading.Lock(); one.acquire()", "one.acquire(timeout=1)", "one.release()"),
+        ("threading.Lock(); one.acquire()", "one.acquire()", "one.release()"),
+        ("threading.Event()", "one.wait(1)", "one.set()"),
+        ("threading.Semaphore(0)", "one.acquire(timeout=1)", "one.release()"),
+        ("queue.Queue()", "one.get(timeout=1)", "one.put(True)"),
+        ("queue.SimpleQueue()", "one.get(timeout=1)", "one.put(True)"),
+        ("concurrent.futures.Future()", "one.result(1)", "one.set_result(True)"),
+    ],
+)
+def test_what_others_do_while_a_program_works_is_seen(made: str, wait: str, wake: str) -> None:
+    """Time passes for the work before a wait, and what is to be waited for may happen in it."""
+    assert play(f"""
+        import concurrent.futures, queue, threading, time
+        one = {made}
+        def other():
+            time.sleep(0.1)
+            {wake}
+        threading.Thread(target=other).start()
+        work(200)
+        say({wait})
+    """) == ["200 True", "200 end"]
+
+
 def test_a_lock_can_be_copied_no_more_than_elsewhere() -> None:
     """A program that copies an object with a lock in it fails, and fails here as well."""
     said = play("""
