@@ -191,8 +191,8 @@ def test_an_installed_rubric_has_all_its_names(wheel: Path, tmp_path: Path) -> N
     assert [path.name for path in rubrics.iterdir() if path.is_file()] == ["rubric.schema.json"]
 
 
+@pytest.mark.nightly
 @pytest.mark.ros
-@pytest.mark.long
 def test_the_installed_wheel_grades_in_a_bare_root(wheel: Path, tmp_path: Path) -> None:
     """It brings all it needs: there are Python, the environment and a submission, but no home, user or network."""
     environment, home = tmp_path / "environment", tmp_path / "home"

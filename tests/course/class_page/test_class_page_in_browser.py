@@ -104,7 +104,7 @@ def called(page: Page) -> list[str]:
     return [cells[0].split("\n")[0] for cells in rows(page)]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_table_sorts_by_score_and_by_name(page: Page) -> None:
     """Down, up, and back to surnames; whoever has no score comes last; the order is told to who listens."""
     head = page.locator("th[data-sort=final]")

@@ -318,6 +318,7 @@ def an_interface_package(folder: Path) -> None:
     (folder / "CMakeLists.txt").write_text('rosidl_generate_interfaces(${PROJECT_NAME} "msg/Say.msg")\n')
 
 
+@pytest.mark.breadth(0, 2)
 @pytest.mark.long
 @pytest.mark.ros
 @pytest.mark.parametrize(

@@ -185,7 +185,7 @@ def test_only_the_wall_clock_can_decide(open_folder: Path) -> None:
     assert "there is nothing to compare" in done.stdout
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.ros
 def test_the_result_in_evidence(open_folder: Path) -> None:
     """The kept recordings are compared too; evidence of other files is refused, and judging again works as before."""

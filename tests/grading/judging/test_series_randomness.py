@@ -57,7 +57,7 @@ COMPUTED: dict[str, tuple[Callable[[int], float], str]] = {
 }
 
 
-@pytest.mark.breadth(8, 64)
+@pytest.mark.breadth(8, 20)
 @pytest.mark.parametrize("name", GENERATORS)
 @pytest.mark.parametrize("count", [10, 12, 20, 60, 120])
 def test_every_generator_passes(name: str, count: int) -> None:

@@ -38,7 +38,7 @@ def outcome(trace: Trace) -> tuple[bool, str, str]:
     return "made" in [line.text for line in trace.lines()], text, fault.file
 
 
-@pytest.mark.breadth(1, 4)
+@pytest.mark.breadth(1, 2)
 @pytest.mark.parametrize("name", but(["random"], NAMES))
 def test_a_hidden_module_fails_where_it_fails_for_python3(
     one_worker: RecordingSession, tmp_path: Path, name: str

@@ -53,7 +53,7 @@ def told_on(clock: str, trace: Trace) -> Told:
     return told(trace)
 
 
-@pytest.mark.breadth(8, 20)
+@pytest.mark.breadth(8, 14)
 @rows_of(plan)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(n, name)) for n, name in enumerate(NAMES)])
 def test_what_a_program_does_in_virtual_time(trace: Trace, name: str) -> None:

@@ -106,7 +106,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.breadth(4, 20)
+@pytest.mark.breadth(4, 8)
 @pytest.mark.parametrize("name", sorted(HOSTILE))
 def test_hostile_sources_cost_little(name: str) -> None:
     """Whatever the text, explaining a recording takes no more than two million calls, about half a second."""

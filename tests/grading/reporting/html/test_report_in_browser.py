@@ -123,7 +123,7 @@ def test_hostile_text_stays_text_wherever_it_is_shown(visit: Open, text: str) ->
     assert len(asked) == 1
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_pointer_over_a_chart_is_told_the_value(visit: Open) -> None:
     """The tooltip shows the time and the value of what is under it."""
     page, said, _ = visit(render_html(graded.perfect()))
