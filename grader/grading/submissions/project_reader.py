@@ -13,9 +13,9 @@ from __future__ import annotations
 import ast
 import codecs
 import configparser
-import importlib
 import posixpath
 import re
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -33,23 +33,18 @@ ENCODINGS = ("ascii", "latin-1", "iso8859-15", "cp1252", "utf-8-sig")
 Value = TypeVar("Value")
 
 
-def prepare() -> Any:
-    """Load what a confined process could not; return the module that reads TOML, None before Python 3.11."""
+def prepare() -> None:
+    """Load what a confined process could not."""
     for name in ENCODINGS:
         codecs.lookup(name)
-    try:
-        return importlib.import_module("tomllib")
-    except ImportError:
-        return None
 
 
-def described(files: dict[str, bytes], names: Sequence[str], tomllib: Any) -> dict[str, Any]:
+def described(files: dict[str, bytes], names: Sequence[str]) -> dict[str, Any]:
     """Return what the project files of a package say.
 
     Args:
         files: Content by name; a file that is not there is missing.
         names: The paths of all files below the package's folder.
-        tomllib: The module of this name, or None.
     """
     problems: list[tuple[str, str]] = []
 
@@ -69,7 +64,7 @@ def described(files: dict[str, bytes], names: Sequence[str], tomllib: Any) -> di
     given = read("setup.py", lambda content: given_to_setup(ast.parse(content), names), nothing)
     lines = [
         *_scripts_of_setup(given),
-        *read("pyproject.toml", lambda content: _scripts_of_pyproject(content, tomllib), none),
+        *read("pyproject.toml", _scripts_of_pyproject, none),
         *read("setup.cfg", _scripts_of_configuration, none),
     ]
     name = read("package.xml", _name_in_manifest, None) or given.get("name")
@@ -139,9 +134,8 @@ def _scripts_of_configuration(content: bytes) -> list[str]:
     return parser.get("options.entry_points", "console_scripts", fallback="").splitlines()
 
 
-def _scripts_of_pyproject(content: bytes, tomllib: Any) -> list[str]:
-    """Return the scripts of a pyproject.toml; none before Python 3.11, which cannot read it."""
-    project = tomllib.loads(content.decode()).get("project") if tomllib is not None else None
+def _scripts_of_pyproject(content: bytes) -> list[str]:
+    project = tomllib.loads(content.decode()).get("project")
     scripts = project.get("scripts") if isinstance(project, dict) else None
     given = scripts.items() if isinstance(scripts, dict) else ()
     return [f"{name} = {target}" for name, target in given if isinstance(target, str)]

@@ -45,12 +45,12 @@ def main(limits: dict[str, Any]) -> int:
     size = int.from_bytes(data[-8:], "big")
     asked = json.loads(bytes(data[-8 - size : -8]))
     contents = list(_slices(data, asked["sizes"]))
-    toml = known = None
+    known = None
     # Only what is asked for is imported, and all of it before the process confines itself.
     if asked["packages"]:
         from grader.grading.submissions import project_reader  # noqa: PLC0415
 
-        toml = project_reader.prepare()
+        project_reader.prepare()
     if asked["programs"]:
         from grader.grading.submissions import program_reader, source_encodings  # noqa: PLC0415
 
@@ -66,7 +66,7 @@ def main(limits: dict[str, Any]) -> int:
         for package in asked["packages"]:
             files = {name: bytes(contents[number]) for name, number in package["files"].items()}
             below = list(_below(package["folder"], names)) if package["lists"] else []
-            found = project_reader.described(files, below, toml)
+            found = project_reader.described(files, below)
             _write(sys.stdout.buffer, found)
             run.update(_run_by(found))
     if known is not None:

@@ -94,8 +94,6 @@ HONEST = {
 @pytest.mark.parametrize("files", HONEST.values(), ids=HONEST)
 def test_what_real_packages_declare_is_read(tmp_path: Path, files: Mapping[str, str | bytes]) -> None:
     """However the author writes it down, without a note."""
-    if "pyproject.toml" in files:
-        pytest.importorskip("tomllib")
     assert read_projects(made(tmp_path, files)) == (
         (Project("", "own", (NODE,)),),
         (),
@@ -197,8 +195,6 @@ def test_what_a_hostile_file_holds_becomes_a_note(
     tmp_path: Path, ros: RosInstallation, files: Mapping[str, str | bytes], notes: list[str]
 ) -> None:
     """Its package is there under a name that packages can have, and everything behind it works with what is left."""
-    if "pyproject.toml" in files:
-        pytest.importorskip("tomllib")
     root = made(tmp_path / "ws", files)
     found, told = read_projects(root)
     assert list(told) == notes

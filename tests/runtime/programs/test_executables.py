@@ -58,8 +58,6 @@ def test_what_is_there_instead_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("setup", ["setup.cfg", "pyproject.toml"])
 def test_entry_points_may_be_declared_elsewhere(tmp_path: Path, setup: str) -> None:
     """As setuptools reads them."""
-    if setup == "pyproject.toml":
-        pytest.importorskip("tomllib")
     texts = {
         "setup.cfg": "[options.entry_points]\nconsole_scripts =\n    go = robot.nodes:talk\n",
         "pyproject.toml": '[project]\nname = "robot"\n[project.scripts]\ngo = "robot.nodes:talk"\n',
