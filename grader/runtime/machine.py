@@ -7,7 +7,6 @@ import os
 import platform
 import re
 import shutil
-import stat
 import subprocess
 import sys
 import tempfile
@@ -20,6 +19,7 @@ from grader.runtime.model.checkup import Fact, TierReport
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.quantities import GIB, MIB
 from grader.runtime.model.releases import release_of
+from grader.runtime.outdated import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, outdated, version_of
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.bubblewrap import ENTERABLE
 from grader.runtime.sandbox.choose import Machine, inspect_tier, inspect_tiers, sandbox_memory
@@ -29,7 +29,6 @@ from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
 from grader.runtime.supervisor.byte_code import byte_code
 from grader.runtime.supervisor.memory_groups import group_fact
 from grader.runtime.supervisor.numpy_version import other_numpy
-from grader.runtime.weaknesses import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, known, repaired_here, version_of
 
 #: Disk space that staged submissions, recordings and reports may need at the same time.
 MIN_SCRATCH_BYTES = 512 * MIB
@@ -87,11 +86,6 @@ def node_start(name: str, *, can_fork: bool) -> Fact:
     return Fact("start of nodes", f"{text} into {name}, it needs Linux {'.'.join(map(str, ENTERABLE))} or newer")
 
 
-def weaknesses_here(ros: RosInstallation | None) -> Iterator[Fact]:
-    """Yield the known weaknesses of the software in use, without those that are repaired here."""
-    yield from weaknesses(ros, repaired_here())
-
-
 def easiest_remedy(tiers: Sequence[TierReport]) -> str:
     """Return the easiest fix of a sandbox; running as another user comes last, because it takes the most effort."""
     ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
@@ -139,16 +133,16 @@ def _numpy(ros: RosInstallation) -> Fact:
     return Fact("numpy", f"{value}; {lack}", remedy=f"install numpy {other.wanted}, which needs Python 3.12 or older")
 
 
-def weaknesses(ros: RosInstallation | None, repaired: frozenset[str]) -> Iterator[Fact]:
-    """Yield the known weaknesses of the versions here but for those that the distribution has repaired."""
+def weaknesses(ros: RosInstallation | None) -> Iterator[Fact]:
+    """Yield the programs here that are older than the first version without known weaknesses."""
     bwrap = shutil.which("bwrap")
-    versions = {
-        FAST_DDS: version_of(_fast_dds(ros)) if ros is not None else (),
-        BUBBLEWRAP: version_of(_said_by(bwrap)) if bwrap else (),
-        LINUX: kernel_version(platform.release(), platform.version()),
-    }
-    setuid = bool(bwrap) and bool(Path(str(bwrap)).stat().st_mode & stat.S_ISUID)
-    yield from known(versions, setuid=setuid, repaired=repaired)
+    yield from outdated(
+        {
+            FAST_DDS: version_of(_fast_dds(ros)) if ros is not None else (),
+            BUBBLEWRAP: version_of(_said_by(bwrap)) if bwrap else (),
+            LINUX: kernel_version(platform.release(), platform.version()),
+        }
+    )
 
 
 def system() -> Iterator[Fact]:

@@ -45,7 +45,7 @@ def examine(progress: Progress, find: Callable[[], machine.Found] = machine.ros_
     """Find out what this machine can do; takes a few seconds."""
     progress("looking for ROS 2")
     ros, lack = find()
-    known = machine.weaknesses_here(ros)
+    known = machine.weaknesses(ros)
     own = () if ros is None else _interfaces(ros.distro)
     facts = (*machine.software(ros), *lack, *machine.system(), *known, _archives(), *own, *_added())
     if ros is None:

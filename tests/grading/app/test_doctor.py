@@ -103,14 +103,14 @@ def test_bubblewrap_that_is_not_there_is_told_with_its_command(monkeypatch: pyte
     assert fact.remedy.endswith("install -y bubblewrap")
 
 
-def test_known_weaknesses_are_told_with_their_fixes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """One line each, as text and as JSON; none of them makes grading unsafe."""
+def test_an_outdated_program_is_told_with_its_update(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """In one line, as text and as JSON; it does not make grading unsafe."""
     old = tmp_path / "bwrap"
     old.write_text("#!/bin/sh\necho bubblewrap 0.8.0\n")
     old.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    facts = [fact for fact in machine.weaknesses(None, frozenset()) if "bubblewrap" in fact.value]
-    assert [fact.value.split(": ")[:2] for fact in facts] == [["bubblewrap 0.8.0", "CVE-2026-87766"]]
+    facts = [fact for fact in machine.weaknesses(None) if "bubblewrap" in fact.value]
+    assert len(facts) == 1
     checkup = Checkup(tuple(facts), None, (), "", "", Limits())
     text = render_checkup(checkup, width=200, colour=False)
     assert sum("known weakness" in line for line in text.splitlines()) == 1
