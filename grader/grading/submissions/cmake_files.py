@@ -1,10 +1,14 @@
-"""Finds out which programs a CMakeLists.txt installs for `ros2 run`, without running CMake."""
+"""Finds out which programs a CMakeLists.txt installs for `ros2 run`, without running CMake.
+
+Six commands are understood, each branch of a condition among them. What others do is not known: values of variables
+that they name, and whether a loop or function installs programs.
+"""
 
 from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
 from itertools import pairwise
@@ -12,14 +16,22 @@ from itertools import pairwise
 from grader.grading.submissions.setup_files import LimitError
 from grader.runtime.model.dataclass import dataclass
 
-#: The maximum length of a value, the maximum number of commands that are evaluated, and the deepest nesting of calls.
-TEXT_CHARACTERS, STEPS, DEPTH = 100_000, 20_000, 20
+#: The maximum length of a value, and how often variables in values of variables are replaced.
+TEXT_CHARACTERS, DEPTH = 100_000, 20
 #: The most files that are installed: far more than the programs of a package.
 MOST_INSTALLED = 5_000
 #: Stands for the folder of the CMakeLists.txt in paths, and for what is not known before CMake runs.
 _SOURCE, _UNKNOWN = "/source", "\0"
-_SOURCE_VARIABLES = ("CMAKE_SOURCE_DIR", "CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR", "PROJECT_SOURCE_DIR")
-_BUILD_VARIABLES = ("CMAKE_BINARY_DIR", "CMAKE_CURRENT_BINARY_DIR", "PROJECT_BINARY_DIR")
+_SOURCES = ("CMAKE_SOURCE_DIR", "CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR", "PROJECT_SOURCE_DIR")
+#: Variables that CMake and GNUInstallDirs set; where other folders are installed is of no account here.
+_FIXED = {
+    **dict.fromkeys(_SOURCES, _SOURCE),
+    **dict.fromkeys(("CMAKE_INSTALL_INCLUDEDIR", "CMAKE_INSTALL_DATADIR", "CMAKE_INSTALL_BINDIR"), "other"),
+    "CMAKE_INSTALL_PREFIX": "",
+    "CMAKE_INSTALL_LIBDIR": "lib",
+}
+#: Commands after which there may be programs that were not found.
+_INSTALLING = frozenset({"install", "ament_python_install_package", "add_executable", "add_subdirectory"})
 _TOKEN = re.compile(
     r"(?P<space>[ \t\r\n]+|#\[(?P<c>=*)\[.*?\](?P=c)\]|#[^\n]*)"
     r"|(?P<open>\()|(?P<close>\))"
@@ -31,14 +43,14 @@ _TOKEN = re.compile(
 _REFERENCE = re.compile(r"\$\{([^${}]*)\}")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _MAY_RUN = frozenset({"OWNER_EXECUTE", "GROUP_EXECUTE", "WORLD_EXECUTE"})
-_OPENING = {"if": "endif", "foreach": "endforeach", "while": "endwhile", "function": "endfunction", "macro": "endmacro"}
-#: The keywords of install() with a value, and those that begin a list.
-_ONE, _LISTS = (
-    frozenset({"DESTINATION", "RENAME", "COMPONENT", "TYPE", "PATTERN", "REGEX"}),
-    frozenset({"PERMISSIONS", "FILE_PERMISSIONS", "DIRECTORY_PERMISSIONS", "CONFIGURATIONS"}),
-)
-_FLAGS = frozenset(
-    {"OPTIONAL", "EXCLUDE_FROM_ALL", "USE_SOURCE_PERMISSIONS", "MESSAGE_NEVER", "FILES_MATCHING", "EXCLUDE"}
+#: What is between these commands runs as often as CMake decides.
+_BLOCKS = {"foreach": "endforeach", "while": "endwhile", "function": "endfunction", "macro": "endmacro"}
+_KEYWORDS = frozenset(
+    {
+        *("DESTINATION", "RENAME", "COMPONENT", "TYPE", "PATTERN", "REGEX", "CONFIGURATIONS"),
+        *("PERMISSIONS", "FILE_PERMISSIONS", "DIRECTORY_PERMISSIONS", "USE_SOURCE_PERMISSIONS"),
+        *("OPTIONAL", "EXCLUDE_FROM_ALL", "MESSAGE_NEVER", "FILES_MATCHING", "EXCLUDE"),
+    }
 )
 
 
@@ -92,7 +104,7 @@ def contents_of(text: str, package: str, names: Sequence[str]) -> Contents:
         ValueError: It is not CMake.
     """
     reader = _Reader(package, names)
-    reader.run(list(_commands(text)))
+    reader.run(_commands(text))
     return reader.found
 
 
@@ -131,78 +143,37 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
 
 
 class _Reader:
-    """Evaluates commands; every branch of a condition, because none of the conditions is known."""
+    """Evaluates commands in their order; of a condition every branch, because none of the conditions is known."""
 
     def __init__(self, package: str, names: Sequence[str]) -> None:
         self._package = package
         self._names = names
-        self._values = dict.fromkeys(_SOURCE_VARIABLES, _SOURCE) | dict.fromkeys(_BUILD_VARIABLES, _UNKNOWN)
-        self._values |= {"CMAKE_INSTALL_PREFIX": "", "CMAKE_INSTALL_LIBDIR": "lib", "PROJECT_NAME": package}
-        self._functions: dict[str, tuple[list[str], Sequence[Command]]] = {}
-        self._steps = self._depth = 0
+        self._values = {**_FIXED, "PROJECT_NAME": package}
         self.found = Contents()
 
-    def run(self, commands: Sequence[Command]) -> None:
-        """Evaluate commands in order."""
-        at = 0
-        while at < len(commands):
-            self._count_step()
-            name, raw = commands[at]
-            if name in ("foreach", "while", "function", "macro"):
-                end = _end_of(commands, at)
-                self._block(name, raw, commands[at + 1 : end])
-                at = end
-            elif name in self._functions:
-                self._call(name, self._expanded(raw))
-            elif name in _COMMANDS:
+    def run(self, commands: Iterable[Command]) -> None:
+        """Evaluate commands."""
+        blocks: list[str] = []
+        for name, raw in commands:
+            if name in _BLOCKS:
+                blocks.append(_BLOCKS[name])
+            elif blocks and name == blocks[-1]:
+                blocks.pop()
+            elif blocks or name not in _COMMANDS:
+                self._leave_out(name, raw)
+            else:
                 _COMMANDS[name](self, self._expanded(raw))
-            at += 1
+            if len(self.found.installed) > MOST_INSTALLED:
+                raise LimitError
+        if blocks:
+            raise ValueError(f"expected {blocks[-1]}(), found the end")
 
-    def _count_step(self) -> None:
-        self._steps += 1
-        if self._steps > STEPS or len(self.found.installed) > MOST_INSTALLED:
-            raise LimitError
-
-    def _block(self, kind: str, raw: list[tuple[str, bool]], body: Sequence[Command]) -> None:
-        arguments = self._expanded(raw)
-        if kind == "foreach":
-            for item in self._items(arguments[1:]):
-                self._count_step()
-                self._values[arguments[0]] = item
-                self.run(body)
-        elif kind == "while":
-            self.found.unread = self.found.unread or any(name == "install" for name, _ in body)
-        elif arguments:
-            self._functions[arguments[0].lower()] = (arguments[1:], body)
-
-    def _items(self, arguments: list[str]) -> Iterator[str]:
-        """Yield the values of a foreach()."""
-        if arguments[:1] == ["RANGE"]:
-            yield _UNKNOWN
-            return
-        lists = False
-        for place, argument in enumerate(arguments):
-            if place and argument in ("LISTS", "ITEMS") and arguments[0] == "IN":
-                lists = argument == "LISTS"
-            elif lists:
-                yield from _split(self._values.get(argument, ""))
-            elif place or argument != "IN":
-                if argument in ("LISTS", "ITEMS") and not place:
-                    continue
-                yield argument
-
-    def _call(self, name: str, arguments: list[str]) -> None:
-        parameters, body = self._functions[name]
-        self._depth += 1
-        if self._depth > DEPTH:
-            raise LimitError
-        kept = dict(self._values)
-        self._values |= dict(zip(parameters, arguments, strict=False))
-        self._values |= {"ARGN": ";".join(arguments[len(parameters) :]), "ARGV": ";".join(arguments)}
-        self._values |= {f"ARGV{place}": argument for place, argument in enumerate(arguments)}
-        self.run(body)
-        self._values = kept
-        self._depth -= 1
+    def _leave_out(self, name: str, raw: Sequence[tuple[str, bool]]) -> None:
+        """Forget the variables that a command names; one that may install programs is not read."""
+        here = raw[0][0] if raw else ""
+        included = name == "include" and ("/" in here or here.endswith(".cmake"))
+        self.found.unread |= included or name in _INSTALLING
+        self._values |= {text: _UNKNOWN for text, _ in raw if text.isidentifier() and text not in _FIXED}
 
     def _expanded(self, raw: Sequence[tuple[str, bool]]) -> list[str]:
         """Return arguments with the values of variables; an unquoted one is split into its items."""
@@ -214,7 +185,7 @@ class _Reader:
 
     def _filled(self, text: str) -> str:
         for _ in range(DEPTH):
-            filled = _REFERENCE.sub(lambda name: self._values.get(name[1], ""), text)
+            filled = _REFERENCE.sub(lambda name: self._values.get(name[1], _UNKNOWN), text)
             if len(filled) > TEXT_CHARACTERS:
                 raise LimitError
             if filled == text:
@@ -225,109 +196,40 @@ class _Reader:
 
     def set_value(self, arguments: list[str]) -> None:
         """Evaluate `set(NAME VALUE...)`."""
-        if not arguments:
-            return
-        values = arguments[1:]
-        if "CACHE" in values:
-            values = values[: values.index("CACHE")]
-        self._values[arguments[0]] = ";".join(value for value in values if value != "PARENT_SCOPE")
-
-    def remove_value(self, arguments: list[str]) -> None:
-        """Evaluate `unset(NAME)`."""
-        self._values.pop("".join(arguments[:1]), None)
+        values = arguments[1 : arguments.index("CACHE") if "CACHE" in arguments else None]
+        if arguments:
+            self._values[arguments[0]] = ";".join(value for value in values if value != "PARENT_SCOPE")
 
     def name_project(self, arguments: list[str]) -> None:
         """Evaluate `project(NAME ...)`."""
-        if arguments:
-            self._values["PROJECT_NAME"] = self._values["CMAKE_PROJECT_NAME"] = arguments[0]
+        self._values["PROJECT_NAME"] = "".join(arguments[:1])
 
     def change_list(self, arguments: list[str]) -> None:
-        """Evaluate `list(APPEND | PREPEND | REMOVE_ITEM NAME ...)`; another change makes the list unknown."""
+        """Evaluate `list(APPEND NAME ...)`; another change makes the list unknown."""
         kind, name = (*arguments[:2], "", "")[:2]
         known = _split(self._values.get(name, ""))
-        if kind == "APPEND":
-            known += arguments[2:]
-        elif kind in ("PREPEND", "INSERT"):
-            known = arguments[2 if kind == "PREPEND" else 3 :] + known
-        elif kind == "REMOVE_ITEM":
-            known = [item for item in known if item not in arguments[2:]]
-        elif kind in ("FILTER", "TRANSFORM", "SUBLIST", "POP_BACK", "POP_FRONT"):
-            known = [_UNKNOWN]
-        self._values[name] = ";".join(known)
+        self._values[name] = ";".join([*known, *arguments[2:]]) if kind == "APPEND" else _UNKNOWN
 
     def find_files(self, arguments: list[str]) -> None:
-        """Evaluate `file(GLOB NAME ...)` and `file(GLOB_RECURSE NAME ...)`."""
-        if len(arguments) < 2 or arguments[0] not in ("GLOB", "GLOB_RECURSE"):
+        """Evaluate `file(GLOB NAME PATTERN...)`, of patterns below the package; what others find is unknown."""
+        kind, name = (*arguments[:2], "", "")[:2]
+        patterns = [_path(word) for word in arguments[2:] if word != "CONFIGURE_DEPENDS"]
+        if kind != "GLOB" or None in patterns or "RELATIVE" in patterns:
+            self._values[name] = _UNKNOWN
             return
-        rest, patterns, relative = arguments[2:], [], ""
-        while rest:
-            word = rest.pop(0)
-            if word == "LIST_DIRECTORIES" and rest:
-                rest.pop(0)
-            elif word == "RELATIVE" and rest:
-                relative = rest.pop(0)
-            elif word not in ("CONFIGURE_DEPENDS", "FOLLOW_SYMLINKS"):
-                patterns.append(_path(word))
-        found = []
-        for pattern in patterns:
-            if pattern is None:
-                found.append(_UNKNOWN)
-                continue
-            folder, _, last = pattern.rpartition("/")
-            recursive = arguments[0] == "GLOB_RECURSE"
-            found += sorted(name for name in self._names if _globbed(name, folder, last, recursive=recursive))
-        above = _path(relative) if relative else None
-        paths = [f"{_SOURCE}/{name}" if name != _UNKNOWN else name for name in found]
-        if above is not None:
-            paths = [p if p == _UNKNOWN else posixpath.relpath(p, posixpath.join(_SOURCE, above)) for p in paths]
-        self._values[arguments[1]] = ";".join(paths)
-
-    def take_part(self, arguments: list[str]) -> None:
-        """Evaluate `get_filename_component(NAME PATH PART)`."""
-        if len(arguments) < 3:
-            return
-        name, path, part = arguments[:3]
-        last = posixpath.basename(path)
-        parts = {
-            "NAME": last,
-            "NAME_WE": last.partition(".")[0],
-            "NAME_WLE": posixpath.splitext(last)[0],
-            "DIRECTORY": posixpath.dirname(path),
-            "PATH": posixpath.dirname(path),
-            "EXT": "".join(last.partition(".")[1:]),
-            "ABSOLUTE": posixpath.join(_SOURCE, path),
-            "REALPATH": posixpath.join(_SOURCE, path),
-        }
-        self._values[name] = parts.get(part, _UNKNOWN) if _UNKNOWN not in path else _UNKNOWN
-
-    def change_text(self, arguments: list[str]) -> None:
-        """Evaluate `string(REPLACE OLD NEW NAME TEXT...)`; what another one makes is unknown."""
-        if arguments[:1] == ["REPLACE"] and len(arguments) > 4 and arguments[1]:
-            self._values[arguments[3]] = "".join(arguments[4:]).replace(arguments[1], arguments[2])
-            return
-        self._values |= {name: _UNKNOWN for name in arguments[1:] if name.isidentifier() and name != "PROJECT_NAME"}
+        wanted = [pattern.split("/") for pattern in patterns if pattern is not None]
+        found = [name for pattern in wanted for name in sorted(self._names) if _globbed(name.split("/"), pattern)]
+        self._values[name] = ";".join(f"{_SOURCE}/{name}" for name in found)
 
     def build(self, arguments: list[str]) -> None:
-        """Evaluate `add_executable(NAME ...)` or `rclcpp_components_register_node(... EXECUTABLE NAME)`."""
-        if "EXECUTABLE" in arguments[:-1]:
-            self.found.built.append(arguments[arguments.index("EXECUTABLE") + 1])
-        elif arguments:
-            self.found.built.append(arguments[0])
-        self.found.unread = self.found.unread or any(_UNKNOWN in name for name in self.found.built[-1:])
+        """Evaluate `add_executable(NAME ...)`."""
+        self.found.built += arguments[:1]
+        self.found.unread |= _UNKNOWN in arguments[:1]
 
     def register(self, arguments: list[str]) -> None:
-        """Evaluate `rclcpp_components_register_node(LIBRARY ... EXECUTABLE NAME)`."""
+        """Evaluate `rclcpp_components_register_node(... EXECUTABLE NAME)`."""
         if "EXECUTABLE" in arguments:
-            self.build(arguments)
-
-    def include(self, arguments: list[str]) -> None:
-        """Evaluate a command that reads another file, which may install more."""
-        here = "".join(arguments[:1])
-        self.found.unread = self.found.unread or "/" in here or here.endswith(".cmake") or _UNKNOWN in here
-
-    def add_folder(self, _: list[str]) -> None:
-        """Evaluate `add_subdirectory(FOLDER)`, whose own file is not read."""
-        self.found.unread = True
+            self.build(arguments[arguments.index("EXECUTABLE") + 1 :])
 
     def install_python(self, arguments: list[str]) -> None:
         """Evaluate `ament_python_install_package(NAME ...)`."""
@@ -343,43 +245,29 @@ class _Reader:
                 self.found.configurations.append(configuration)
 
     def install(self, arguments: list[str]) -> None:
-        """Evaluate `install(PROGRAMS | FILES | DIRECTORY ...)`."""
+        """Evaluate `install(PROGRAMS | FILES | DIRECTORY ...)`; which files of a folder patterns take is not known."""
         kind = "".join(arguments[:1])
-        if kind in ("CODE", "SCRIPT"):
-            self.found.unread = True
+        self.found.unread |= kind in ("CODE", "SCRIPT")
         if kind not in ("PROGRAMS", "FILES", "DIRECTORY"):
             return
-        given = _Given.of(arguments[1:])
-        target = given.value("DESTINATION")
-        if _UNKNOWN in target:
-            self.found.unread = True
+        given = _by_keyword(arguments[1:])
+        target = "".join(given.get("DESTINATION", ())[:1])
         if not self._is_for_programs(target):
+            self.found.unread |= _UNKNOWN in target
             return
-        for source in given.sources:
-            path = _path(source)
-            if path is None:
+        for path in map(_path, given[""]):
+            if path is None or {"PATTERN", "REGEX"} & {*given}:
                 self.found.unread = True
             elif kind == "DIRECTORY":
-                self._install_folder(path, given)
+                kept = "source" if "USE_SOURCE_PERMISSIONS" in given else "no"
+                runs = kept if _MAY_RUN.isdisjoint(given.get("FILE_PERMISSIONS", ())) else "yes"
+                below = [name for name in self._names if not path or name.startswith(f"{path}/")]
+                self.found.installed += [Installed(posixpath.basename(name), name, runs) for name in below]
             else:
-                runs = kind == "PROGRAMS" if "PERMISSIONS" not in given.lists else given.may_run("PERMISSIONS")
-                name = given.value("RENAME") or path.rpartition("/")[2]
-                self.found.installed.append(Installed(name, path, "yes" if runs else "no"))
-
-    def _install_folder(self, folder: str, given: _Given) -> None:
-        if any(kind == "REGEX" for kind, _, _ in given.matches):
-            self.found.unread = True
-        kept = "source" if "USE_SOURCE_PERMISSIONS" in given.flags else "no"
-        runs = "yes" if given.may_run("FILE_PERMISSIONS") else kept
-        for path in self._names:
-            if folder and not path.startswith(f"{folder}/"):
-                continue
-            found = [match for match in given.matches if match[0] == "PATTERN" and _matches(path, match[1])]
-            if any("EXCLUDE" in more for _, _, more in found) or ("FILES_MATCHING" in given.flags and not found):
-                continue
-            own = next((more for _, _, more in found if "PERMISSIONS" in more), None)
-            executable = runs if own is None else "yes" if not _MAY_RUN.isdisjoint(own) else "no"
-            self.found.installed.append(Installed(path.rpartition("/")[2], path, executable))
+                runs = "yes" if kind == "PROGRAMS" and "PERMISSIONS" not in given else "no"
+                runs = runs if _MAY_RUN.isdisjoint(given.get("PERMISSIONS", ())) else "yes"
+                name = "".join(given.get("RENAME", ())[:1]) or posixpath.basename(path)
+                self.found.installed.append(Installed(name, path, runs))
 
     def _is_for_programs(self, target: str) -> bool:
         """Return whether `ros2 run` looks for programs of the package in an installed folder."""
@@ -388,62 +276,16 @@ class _Reader:
         return normal == own or normal.startswith(f"{own}/")
 
 
-@dataclass(slots=True)
-class _Given:
-    """The arguments of an install()."""
-
-    sources: list[str] = field(default_factory=list)
-    values: dict[str, str] = field(default_factory=dict)
-    lists: dict[str, list[str]] = field(default_factory=dict)
-    flags: set[str] = field(default_factory=set)
-    matches: list[tuple[str, str, list[str]]] = field(default_factory=list)  # `PATTERN`, the pattern, and what follows
-
-    @classmethod
-    def of(cls, arguments: Sequence[str]) -> _Given:
-        """Sort arguments."""
-        given = cls()
-        into: list[str] | None = given.sources
-        words = iter(arguments)
-        for word in words:
-            last = given.matches[-1][2] if given.matches else None
-            if word in ("PATTERN", "REGEX"):
-                given.matches.append((word, next(words, ""), []))
-                into = None
-            elif word in _ONE:
-                given.values[word] = next(words, "")
-                into = None
-            elif word in _LISTS:
-                into = given.lists.setdefault(word, []) if last is None or word != "PERMISSIONS" else last
-                if into is last and last is not None:
-                    last.append(word)
-            elif word in _FLAGS:
-                if word == "EXCLUDE" and last is not None:
-                    last.append(word)
-                else:
-                    given.flags.add(word)
-                into = None
-            elif into is not None:
-                into.append(word)
-        return given
-
-    def value(self, name: str) -> str:
-        """Return the value of a keyword; empty if it is not given."""
-        return self.values.get(name, "")
-
-    def may_run(self, name: str) -> bool:
-        """Return whether a list of permissions lets somebody execute the file."""
-        return not _MAY_RUN.isdisjoint(self.lists.get(name, ()))
-
-
-def _end_of(commands: Sequence[Command], begin: int) -> int:
-    """Return the place of the command that ends a block."""
-    opening, depth = commands[begin][0], 0
-    for place in range(begin, len(commands)):
-        name = commands[place][0]
-        depth += (name == opening) - (name == _OPENING[opening])
-        if not depth:
-            return place
-    raise ValueError(f"{opening}() without an end")
+def _by_keyword(arguments: Sequence[str]) -> Mapping[str, Sequence[str]]:
+    """Return what follows each keyword of an install(), and what is before all as that of an empty one."""
+    into: list[str] = []
+    given = {"": into}
+    for word in arguments:
+        if word in _KEYWORDS:
+            into = given.setdefault(word, [])
+        else:
+            into.append(word)
+    return given
 
 
 def _split(value: str) -> list[str]:
@@ -458,37 +300,19 @@ def _path(text: str) -> str | None:
     return whole[len(_SOURCE) + 1 :]
 
 
-def _globbed(name: str, folder: str, pattern: str, *, recursive: bool) -> bool:
-    here, _, last = name.rpartition("/")
-    inside = here == folder if not recursive else f"{here}/".startswith(f"{folder}/" if folder else "")
-    if not recursive and not inside and "*" in folder:
-        parts, wanted = here.split("/"), folder.split("/")
-        inside = len(parts) == len(wanted) and all(map(fnmatchcase, parts, wanted))
-    return inside and fnmatchcase(last, pattern)
-
-
-def _matches(path: str, pattern: str) -> bool:
-    """Return whether the end of a path matches a PATTERN of install(DIRECTORY), as a whole name or path."""
-    parts, wanted = path.split("/"), pattern.split("/")
-    return any(
-        all(map(fnmatchcase, parts[at : at + len(wanted)], wanted)) and len(parts[at:]) >= len(wanted)
-        for at in range(len(parts))
-    )
+def _globbed(name: Sequence[str], pattern: Sequence[str]) -> bool:
+    """Return whether the parts of a path match those of a pattern."""
+    return len(name) == len(pattern) and all(map(fnmatchcase, name, pattern))
 
 
 _COMMANDS: Mapping[str, Callable[[_Reader, list[str]], None]] = {
-    "set": _Reader.set_value,
-    "unset": _Reader.remove_value,
     "project": _Reader.name_project,
+    "set": _Reader.set_value,
     "list": _Reader.change_list,
     "file": _Reader.find_files,
-    "get_filename_component": _Reader.take_part,
-    "string": _Reader.change_text,
     "add_executable": _Reader.build,
     "ament_auto_add_executable": _Reader.build,
     "rclcpp_components_register_node": _Reader.register,
-    "include": _Reader.include,
-    "add_subdirectory": _Reader.add_folder,
     "ament_python_install_package": _Reader.install_python,
     "install": _Reader.install,
 }

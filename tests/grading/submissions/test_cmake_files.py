@@ -30,8 +30,8 @@ INSTALLS: dict[str, tuple[str, Sequence[tuple[str, str]]]] = {
     ),
     "renamed": (f"install(PROGRAMS scripts/a.py {DEST} RENAME a)", [("a", "scripts/a.py")]),
     "a list": (
-        f"set(S scripts/a.py\n  scripts/b.py)\nlist(REMOVE_ITEM S scripts/b.py)\ninstall(PROGRAMS ${{S}} {DEST})",
-        [A],
+        f"set(S scripts/a.py\n  scripts/b.py)\ninstall(PROGRAMS ${{S}} {DEST})",
+        [A, B],
     ),
     "an appended list": (
         f"list(APPEND S scripts/a.py)\nlist(APPEND S scripts/b.py)\ninstall(PROGRAMS ${{S}} {DEST})",
@@ -42,48 +42,14 @@ INSTALLS: dict[str, tuple[str, Sequence[tuple[str, str]]]] = {
         [A],
     ),
     "a pattern": (f"file(GLOB S scripts/*.py)\ninstall(PROGRAMS ${{S}} {DEST})", [A, B]),
-    "a relative pattern": (
-        "file(GLOB S RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS scripts/*.py)\n"
-        f"install(PROGRAMS ${{S}} {DEST})",
-        [A, B],
-    ),
-    "a pattern for all folders": (
-        f"file(GLOB_RECURSE S *.py)\ninstall(PROGRAMS ${{S}} {DEST})",
-        [A, B, ("__init__.py", "talk/__init__.py")],
-    ),
-    "a loop": (
-        f"foreach(s IN ITEMS a b)\n  install(PROGRAMS scripts/${{s}}.py {DEST} RENAME ${{s}})\nendforeach()",
-        [("a", "scripts/a.py"), ("b", "scripts/b.py")],
-    ),
-    "a loop over a list": (
-        f"set(S scripts/a.py scripts/b.py)\nforeach(s ${{S}})\n  get_filename_component(n ${{s}} NAME_WE)\n"
-        f"  install(PROGRAMS ${{s}} {DEST} RENAME ${{n}})\nendforeach()",
-        [("a", "scripts/a.py"), ("b", "scripts/b.py")],
-    ),
-    "a loop over lists": (
-        f"set(S scripts/a.py)\nforeach(s IN LISTS S)\n  install(PROGRAMS ${{s}} {DEST})\nendforeach(s)",
-        [A],
-    ),
-    "a function": (
-        f"function(add_script file)\n  install(PROGRAMS ${{file}} {DEST})\nendfunction()\nadd_script(scripts/a.py)",
-        [A],
-    ),
-    "a macro with more": (
-        f"macro(add)\n  install(PROGRAMS ${{ARGN}} {DEST})\nendmacro()\nadd(scripts/a.py scripts/b.py)",
-        [A, B],
-    ),
     "a condition": (f"if(NOT WIN32)\n  install(PROGRAMS scripts/a.py {DEST})\nelse()\nendif()", [A]),
     "files with permissions": (
         f"install(FILES scripts/a.py {DEST} PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)",
         [A],
     ),
     "a folder with permissions": (
-        f'install(DIRECTORY scripts/ {DEST} FILE_PERMISSIONS OWNER_READ WORLD_EXECUTE\n  PATTERN "*.txt" EXCLUDE)',
-        [A, B],
-    ),
-    "some files of a folder": (
-        f'install(DIRECTORY scripts {DEST} FILES_MATCHING PATTERN "a.*" PERMISSIONS OWNER_EXECUTE OWNER_READ)',
-        [A],
+        f"install(DIRECTORY scripts/ {DEST} FILE_PERMISSIONS OWNER_READ WORLD_EXECUTE)",
+        [A, B, ("notes.txt", "scripts/notes.txt")],
     ),
     "a comment in brackets": (
         f"#[[ install(PROGRAMS scripts/b.py {DEST}) ]]\ninstall(PROGRAMS scripts/a.py {DEST})",
@@ -114,13 +80,13 @@ def test_programs_that_cmake_installs_are_found(text: str, expected: Sequence[tu
     [
         (f"install(FILES scripts/a.py {DEST})", "no"),
         (f"install(PROGRAMS scripts/a.py {DEST} PERMISSIONS OWNER_READ)", "no"),
-        (f"install(DIRECTORY scripts/ {DEST} FILES_MATCHING PATTERN a.py)", "no"),
-        (f"install(DIRECTORY scripts/ {DEST} USE_SOURCE_PERMISSIONS FILES_MATCHING PATTERN a.py)", "source"),
+        (f"install(DIRECTORY scripts/ {DEST} OPTIONAL)", "no"),
+        (f"install(DIRECTORY scripts/ {DEST} USE_SOURCE_PERMISSIONS)", "source"),
     ],
 )
 def test_what_ros_cannot_run_is_told_apart(text: str, runs: str) -> None:
     """Only what is executable is a program."""
-    assert [(one.name, one.runs) for one in read(text).installed] == [("a.py", runs)]
+    assert [one.runs for one in read(text).installed if one.name == "a.py"] == [runs]
 
 
 @pytest.mark.parametrize(
@@ -133,6 +99,14 @@ def test_what_ros_cannot_run_is_told_apart(text: str, runs: str) -> None:
         f"string(TOUPPER scripts S)\ninstall(PROGRAMS ${{S}}/a.py {DEST})",
         "install(PROGRAMS scripts/a.py DESTINATION $ENV{HOME})",
         "install(CODE [[ message(x) ]])",
+        f"set(S scripts/a.py)\nlist(REMOVE_ITEM S scripts/b.py)\ninstall(PROGRAMS ${{S}} {DEST})",
+        f"set(S scripts/a.py)\nfile(GLOB_RECURSE S *.py)\ninstall(PROGRAMS ${{S}} {DEST})",
+        f"file(GLOB S RELATIVE ${{CMAKE_CURRENT_SOURCE_DIR}} scripts/*.py)\ninstall(PROGRAMS ${{S}} {DEST})",
+        f"foreach(s a b)\n  install(PROGRAMS scripts/${{s}}.py {DEST} RENAME ${{s}})\nendforeach()",
+        f"foreach(s a b)\n  list(APPEND S scripts/${{s}}.py)\nendforeach()\ninstall(PROGRAMS ${{S}} {DEST})",
+        f"macro(add)\n  install(PROGRAMS ${{ARGN}} {DEST})\nendmacro()\nadd(scripts/a.py scripts/b.py)",
+        f'install(DIRECTORY scripts {DEST} FILES_MATCHING PATTERN "a.*" PERMISSIONS OWNER_EXECUTE OWNER_READ)',
+        f"get_filename_component(S scripts/a.py NAME)\ninstall(PROGRAMS scripts/${{S}} {DEST})",
     ],
 )
 def test_what_only_cmake_knows_is_admitted(text: str) -> None:
@@ -164,7 +138,7 @@ endif()
 @pytest.mark.parametrize("text", ["install(PROGRAMS", "install PROGRAMS)", 'set(A "x)', ")", "foreach(a b)\nset(C d)"])
 def test_what_is_not_cmake_is_an_error(text: str) -> None:
     """CMake would refuse it too."""
-    with pytest.raises(ValueError, match=r"not CMake|without an end"):
+    with pytest.raises(ValueError, match=r"not CMake|found the end"):
         contents_of(text, "talk", NAMES)
 
 
@@ -172,15 +146,9 @@ def test_what_is_not_cmake_is_an_error(text: str) -> None:
     "text",
     [
         "set(A x;x;x;x;x;x;x;x)\n" + "".join(f"set(A{n} ${{A}}{n})\nset(A ${{A}};${{A}})\n" for n in range(40)),
-        "macro(m)\nm()\nendmacro()\nm()",
-        "set(L "
-        + " ".join(map(str, range(200)))
-        + ")\n"
-        + "".join(f"foreach(v{n} ${{L}})\n" for n in range(4))
-        + "set(X y)\n"
-        + "endforeach()\n" * 4,
+        "file(GLOB S scripts/*)\n" + f"install(PROGRAMS ${{S}} {DEST})\n" * 3_000,
     ],
-    ids=["values", "calls", "loops"],
+    ids=["values", "files"],
 )
 def test_what_never_ends_is_cut_off(text: str) -> None:
     """A hostile file costs a bounded amount of work."""
