@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from grader.grading.model.rubric_files import rubric_file, rubric_files
+from grader.grading.model.rubric_files import rubric_file
 from grader.runtime.model.errors import GraderError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ PATH = click.Path(path_type=Path)
 
 
 class RubricPath(click.Path):
-    """The path of a rubric's file, which its exercise's folder stands for as well, and the name it once had."""
+    """The path of a rubric's file, for which the folder of its exercise stands too."""
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> Path:  # type: ignore[override]
         """Return the path of the file."""
@@ -36,12 +36,6 @@ class RubricPath(click.Path):
 
 RUBRIC = RubricPath(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., object])
-
-
-def all_rubrics(ctx: click.Context, param: click.Parameter, named: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Return the files of the rubrics that are named, for the parameter of a command."""
-    del ctx, param
-    return rubric_files(named)
 
 
 def audience_options(command: _Command) -> _Command:

@@ -11,7 +11,6 @@ import click
 
 from grader.cli.options import complain
 from grader.grading.model.grading_options import BATCH, names
-from grader.grading.model.rubric_files import rubric_file
 
 if TYPE_CHECKING:
     from grader.course.classroom.last_run import LastRun
@@ -26,7 +25,6 @@ KEPT = (
     "roster",
     "adjustments",
     *names(BATCH),
-    "odom_bag",
     "seed_key",
     "title",
     "standalone",
@@ -166,9 +164,8 @@ def _split(name: str, text: str) -> tuple[str, str]:
 
 
 def _place(name: str, text: str) -> str:
-    """Return where what was typed for an option is: the path of a built-in rubric may be its old one."""
-    path = _split(name, text)[1]
-    return str(rubric_file(Path(path))) if name == "rubrics" else path
+    """Return the path in what was typed for an option."""
+    return _split(name, text)[1]
 
 
 def _with_path(name: str, text: str, changed: Callable[[str], str]) -> str:

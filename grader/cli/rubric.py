@@ -9,7 +9,6 @@ import click
 from grader.cli.options import (
     PATH,
     RUBRIC,
-    all_rubrics,
     complain,
     inputs_options,
     print_for_programs,
@@ -28,7 +27,7 @@ def command() -> None:
 
 
 @command.command(name="check")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUBRIC, callback=all_rubrics)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUBRIC)
 @run_option("interfaces", GRADE)
 def _check(*, files: tuple[Path, ...], interfaces: tuple[Path, ...]) -> int:
     """Say whether rubrics can be used, with line and column of every mistake, and what is odd about them.
@@ -70,15 +69,11 @@ def _schema(*, rubric: Path | None) -> int:
 
 @command.command(name="variant")
 @click.argument("rubric", metavar="FILE", type=RUBRIC)
-@click.option("--variant-key", "key", type=PATH, metavar="FILE", help="The course key.")
-@click.option("--key-file", "old_key", type=PATH, hidden=True)  # its name in earlier versions
+@click.option("--variant-key", "key", type=PATH, metavar="FILE", required=True, help="The course key.")
 @click.option("--student", metavar="ID", required=True, help="The student, by the id on the roster.")
 @click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="Output format.")
-def _variant(*, rubric: Path, key: Path | None, old_key: Path | None, student: str, format_: str) -> int:
+def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:
     """Print the values that a rubric has for one student, for the task sheet."""
-    key = key or old_key
-    if key is None:
-        raise click.UsageError("Missing option '--variant-key'.")
     from grader.grading.app.seeds import by_key
     from grader.grading.reporting.explained import render_sheet, sheet_to_json
     from grader.grading.rubrics.loader import read_rubric
@@ -89,7 +84,7 @@ def _variant(*, rubric: Path, key: Path | None, old_key: Path | None, student: s
 
 
 @command.command(name="explain")
-@click.argument("files", metavar="[FILE]...", nargs=-1, type=RUBRIC, callback=all_rubrics)
+@click.argument("files", metavar="[FILE]...", nargs=-1, type=RUBRIC)
 @click.option("--checks", "checks", is_flag=True, help="List the checks that rubrics can use, one line each.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 def _explain(*, files: tuple[Path, ...], checks: bool, as_json: bool) -> int:

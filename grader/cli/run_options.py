@@ -12,16 +12,7 @@ import click
 
 from grader.cli.completion import complete_exercise
 from grader.cli.options import PATH, RUBRIC
-from grader.grading.model.grading_options import (
-    OBSERVE,
-    ODOMETRY,
-    GradingOptions,
-    Option,
-    OptionKind,
-    names,
-    percent,
-    rows,
-)
+from grader.grading.model.grading_options import OBSERVE, GradingOptions, Option, OptionKind, names, percent, rows
 
 _Command = Callable[..., int]
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -34,12 +25,8 @@ def run_options(
 
     def decorate(function: _Command) -> _Command:
         @wraps(function)
-        def called(*arguments: Any, odom_bag: Path | None = None, **given: Any) -> int:
+        def called(*arguments: Any, **given: Any) -> int:
             values = {name: given.pop(name) for name in names(command, record)}
-            if odom_bag and ODOMETRY in dict(values["bags"]):
-                raise click.BadParameter(f"--odom-bag and --recording {ODOMETRY} exclude each other")
-            if odom_bag:
-                values["bags"] = ((ODOMETRY, odom_bag), *values["bags"])
             if "exercises" in values:
                 values["exercises"] = tuple(dict.fromkeys(values["exercises"]))
             if "student" in values:
@@ -57,17 +44,10 @@ def run_options(
 def run_option(
     name: str, command: str, record: type[GradingOptions] = GradingOptions
 ) -> Callable[[_Function], _Function]:
-    """Return the decorator that adds one option, as this command of the record has it.
-
-    With the recordings comes their older form.
-    """
+    """Return the decorator that adds one option, as this command of the record has it."""
     row, default = next((row, each.default) for each_name, row, each in rows(record) if each_name == name)
     attributes = _attributes(row, command, row.defaults.get(command, default), many=isinstance(default, tuple))
-    option = click.option(row.flag, name, **attributes)
-    if row.kind is not OptionKind.BAG:
-        return option
-    older = click.option("--odom-bag", type=PATH, help=f"The same as {row.flag} {ODOMETRY}=PATH.")
-    return lambda function: option(older(function))
+    return click.option(row.flag, name, **attributes)
 
 
 def _attributes(row: Option, command: str, default: Any, *, many: bool) -> dict[str, Any]:

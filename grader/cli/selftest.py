@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from grader.cli.options import PATH, RUBRIC, all_rubrics, complain, print_result, shown_progress, write_file
+from grader.cli.options import PATH, RUBRIC, complain, print_result, shown_progress, write_file
 from grader.cli.run_options import run_option
 from grader.grading.model.grading_options import BATCH
 from grader.grading.model.rubric_files import notes_on, rubric_of
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command(name="selftest")
-@click.argument("rubrics", metavar="RUBRIC...", nargs=-1, required=True, type=RUBRIC, callback=all_rubrics)
+@click.argument("rubrics", metavar="RUBRIC...", nargs=-1, required=True, type=RUBRIC)
 @click.option(
     "--reference", type=PATH, metavar="FOLDER", help="A correct solution; by default the one that the notes name."
 )

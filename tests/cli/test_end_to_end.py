@@ -129,7 +129,7 @@ def test_recordings_of_other_robots_can_be_played(bag: str) -> None:
     path = SHARED / "bags" / bag
     if not path.exists():
         pytest.skip(f"{path} is not on this machine")
-    done = run(ROOT / "reference_solutions", "--exercise", "odom_subscriber", "--odom-bag", path)
+    done = run(ROOT / "reference_solutions", "--exercise", "odom_subscriber", "--recording", f"/odom={path}")
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -17,12 +17,12 @@ import click
 import pytest
 from cli_samples import a_report
 from click.testing import CliRunner, Result
+from tracing import ODOMETRY
 
 import grader
 from grader.cli import interactive, main
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.model.report import Report
 from grader.runtime.model import errors
 
@@ -80,7 +80,7 @@ def test_the_everyday_form_prints_the_text_report(run_session: Session) -> None:
 
 def test_every_option_reaches_the_session(run_session: Session) -> None:
     """What is asked for is what is graded; a repeated exercise is graded once."""
-    options = ["--exercise", "b", "--exercise", "a", "--exercise", "b", "--seed", "5", "--odom-bag", "bag"]
+    options = ["--exercise", "b", "--exercise", "a", "--exercise", "b", "--seed", "5", "--recording", f"{ODOMETRY}=bag"]
     options += ["--rubric", "r1.yaml", "--rubric", "r2.yaml", "--clock", "wall", "--isolation", "none", "--no-progress"]
     options += ["--time-budget", "20"]
     result = run_session.call(*options, "ada")
@@ -276,7 +276,7 @@ def test_nothing_is_said_while_grading_unless_stderr_is_a_terminal(run_session: 
 def test_help_names_every_option_and_the_exit_codes(run_session: Session) -> None:
     """Both spellings, before and after the submission, show the same."""
     text = run_session.call("--help").stdout
-    for word in ("--exercise ID", "--seed N", "--odom-bag", "--json", "FORMAT=PATH", "--rubric", "--min-score P"):
+    for word in ("--exercise ID", "--seed N", "--recording", "--json", "FORMAT=PATH", "--rubric", "--min-score P"):
         assert word in text
     for word in (
         "--clock [virtual|wall|auto]",

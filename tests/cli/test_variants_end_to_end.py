@@ -33,7 +33,7 @@ def test_a_student_is_graded_by_their_own_values_and_sees_only_what_is_open(
     waits = "    title: Turns at 0.1 rad/s\n    feedback: {show: nothing, until: 2026-12-01}\n"
     (tmp_path / "r.yaml").write_text(text.replace("    title: Turns at 0.1 rad/s\n", waits), encoding="utf-8")
     (tmp_path / "course.key").write_text("a course key of enough bytes\n", encoding="utf-8")
-    sheet = run("rubric", "variant", "r.yaml", "--key-file", "course.key", "--student", "Ada", "--format", "json")
+    sheet = run("rubric", "variant", "r.yaml", "--variant-key", "course.key", "--student", "Ada", "--format", "json")
     values = json.loads(sheet.stdout)["values"]
     program = SOLUTION.read_text(encoding="utf-8")
     program = program.replace("RATE_HZ = 20", f"RATE_HZ = {values['rate'].split()[0]}")

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tracing import ODOMETRY
 
-from grader.grading.model.grading_options import ODOMETRY
 from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.runtime.model.scenario import Between, JustAbove, JustBelow, Scenario, Span, Stimulus
 from grader.runtime.model.submission import StudentFile, Submission

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tracing import ODOMETRY
 
 from grader.grading.evidence.manifest import scenario_digest
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.builtin import builtin_exercises
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.scenario import (

@@ -26,8 +26,8 @@ from grader.grading.app.observe import ObserveRequest, undisturbed, watch
 from grader.grading.judging.findings import fault_sentence
 from grader.grading.judging.values import carries_number, student_endpoints
 from grader.grading.model.exercise import Exercise
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.model.wording import quote
+from grader.grading.rubrics.builtin import ODOMETRY
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
 from grader.grading.rubrics.simulations import offered
@@ -73,8 +73,8 @@ def _messages(topic: str, type_: str, duration_s: float) -> DraftStimulus:
     start = in_seconds(FIRST_S)
     left_s = duration_s - FIRST_S
     if type_ == ODOMETRY:  # a recording of this type ships with the grader
-        played = {"topic": topic, "start": start, "duration": in_seconds(max(1.0, left_s - 1))}
-        return DraftStimulus("odometry", played, "decide: how long is it silent before and after?")
+        played = {"topic": topic, "type": type_, "start": start, "duration": in_seconds(max(1.0, left_s - 1))}
+        return DraftStimulus("recorded", played, "decide: how long is it silent before and after?")
     if carries_number(type_):
         times = {"period": DraftQuantity("200 ms"), "hold": in_seconds(max(0.5, left_s // len(_VALUES)))}
         numbers = {"topic": topic, "type": type_, "values": list(_VALUES), **times, "start": start}

@@ -309,9 +309,7 @@ class Conditions:
         return replace(self, options=replace(self.options, seed=seed), variants=variants)
 
     def _digest(self, depends_on: dict[str, Any], submission: str) -> str:
-        depends_on |= {"grader": self.grader, "submission": submission}
-        if self.interfaces:  # results of earlier versions do not have it
-            depends_on["interfaces"] = self.interfaces
+        depends_on |= {"grader": self.grader, "submission": submission, "interfaces": self.interfaces}
         # A changed share affects only submissions that are drawn with one share and not with the other.
         if self.draws(submission):
             depends_on["spot_check"] = True

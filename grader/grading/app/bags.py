@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.grading.model.exercise import Exercise, recordings_in
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.builtin import builtin_recording
 from grader.runtime.compiled import COMPILED, compiled, state_of
 from grader.runtime.model.errors import RecordingError
@@ -54,8 +53,6 @@ def observed(given: Iterable[tuple[str, Path]], start_ns: int, duration_ns: int)
 
 def _topic_in(name: str, path: Path) -> tuple[str, str]:
     """Return the topic to play a recording on, given by its name or type, and its type."""
-    if name == ODOMETRY:  # as `--odom-bag` did before other recordings could be played
-        return "/odom", name
     topics = topics_in(path)
     if name.startswith("/"):
         types = {topics[name]} if name in topics else set(topics.values())

@@ -10,7 +10,7 @@ import re
 import stat
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass, replace
 from enum import Enum
 from functools import lru_cache
 from pathlib import Path
@@ -18,7 +18,6 @@ from typing import Any
 
 import msgspec
 
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.model.report import Environment
 from grader.runtime.files import replace_file
 from grader.runtime.model.errors import EvidenceError
@@ -220,7 +219,7 @@ def sha256(data: bytes) -> str:
 
 def _plainly(value: Any) -> Any:
     if isinstance(value, RecordedStream):
-        return _recorded(value)
+        value = replace(value, bag="")  # a path; its messages have a digest of their own
     if is_dataclass(value):
         kept = {f.name: getattr(value, f.name) for f in fields(value)}
         defaults = {f.name: f.default for f in fields(value) if f.default is not MISSING}
@@ -233,13 +232,3 @@ def _plainly(value: Any) -> Any:
     if isinstance(value, bytes):  # the text of an author's simulation
         return sha256(value)
     return value.value if isinstance(value, Enum) else value
-
-
-def _recorded(stream: RecordedStream) -> Mapping[str, Any]:
-    """Return what determines a stimulus that plays a recording, apart from its messages, which have their own digest.
-
-    The names are those of evidence that was kept when only odometry was played, so it can still be judged again.
-    """
-    kept = {"topic": stream.topic, "start_ns": stream.start_ns, "duration_ns": stream.duration_ns}
-    others = {} if stream.type == ODOMETRY else {"type": stream.type}
-    return {"OdometryStream": _plainly({**kept, **others})}

@@ -253,7 +253,7 @@ def _as_facts(  # noqa: PLR0913  each comes from another place
         "submission": submission,
         "rubric": rubric,
         "seed": str(seed),
-        "odometry": recording,  # the name that the format has for the digest of the recordings that were played
+        "recordings": recording,
         "environment": json.dumps(asdict(environment)),
     }
 

@@ -22,9 +22,6 @@ GRADE, BATCH, VERIFY, OBSERVE = "grade", "batch", "verify", "observe"
 ISOLATION = "GRADER_ISOLATION"
 #: The values of `--clock`, and of `--isolation`.
 CLOCKS, SANDBOXES = ("virtual", "wall", "auto"), ("auto", *TIERS)
-#: The type of messages that the stimulus `odometry` plays and `--odom-bag` replaces. Both are older than `recorded` and
-#: `--recording TYPE=BAG`, and aliases of them.
-ODOMETRY = "nav_msgs/msg/Odometry"
 _AS_IN_GRADE = "As in `grade`."
 
 
@@ -236,7 +233,7 @@ def _written(row: Option, value: Any) -> tuple[str, ...]:
         return row.flag, f"{value:g}"
     if row.kind is OptionKind.BAG:
         name, path = value
-        return ("--odom-bag", str(path)) if name == ODOMETRY else (row.flag, f"{name}={path}")
+        return row.flag, f"{name}={path}"
     return row.flag, str(value)
 
 
@@ -245,7 +242,7 @@ def percent(share: float) -> str:
     return f"{share:.6%}".rstrip("%").rstrip("0").rstrip(".") + "%"
 
 
-#: What the requests in evidence of version 1 hold, in their order; other options follow, where they are not as usual.
+#: What all requests in evidence hold, in their order; other options follow, where they are not as usual.
 _IN_EVIDENCE = ("exercises", "bags", "clock", "isolation", "student", "variant_key")
 
 
@@ -257,9 +254,7 @@ def options_to_json(options: GradingOptions) -> dict[str, Any]:
     for name, row, each in kept:
         value = getattr(options, name)
         if row.kind is OptionKind.BAG:
-            bags = {key: str(path) for key, path in value}
-            found["odom_bag"] = bags.pop(ODOMETRY, None)
-            found |= {"recordings": bags} if bags else {}
+            found["recordings"] = {key: str(path) for key, path in value}
         elif name in _IN_EVIDENCE or value != each.default:
             found[name] = _plain(value)
     return found
@@ -276,9 +271,7 @@ def options_of_json(data: Mapping[str, Any], options: _Options) -> _Options:
     given: dict[str, Any] = {}
     for name, row, each in rows(options):
         if row.kind is OptionKind.BAG:
-            bag = data.get("odom_bag")
-            bags = {**({ODOMETRY: bag} if bag is not None else {}), **data.get("recordings", {})}
-            given[name] = tuple((str(key), Path(str(path))) for key, path in bags.items())
+            given[name] = tuple((str(key), Path(str(path))) for key, path in data.get("recordings", {}).items())
         elif row.kept and data.get(name) is not None:
             convert = _converter(row, each.default)
             value = data[name]

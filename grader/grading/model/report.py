@@ -99,7 +99,7 @@ class ExerciseReport:
     # Criterion id -> scenario that it is judged on; not shown in reports
     situations: Mapping[str, str] = field(default_factory=dict)
     variant: Variant | None = None  # the values of this student's variant; None if there are none
-    starts: tuple[Start, ...] = ()  # how each file was started; empty in reports on evidence of earlier versions
+    starts: tuple[Start, ...] = ()  # how each file was started
     unchecked: str = ""  # why a check on the wall clock ended without a result; empty if it had one, or none was due
 
     @property

@@ -7,38 +7,17 @@ from pathlib import Path
 
 #: Names of the rubric and of its notes in the folder of an exercise.
 RUBRIC, NOTES = "rubric.yaml", "selftest.yaml"
-#: What `rubrics/*.yaml` names where a shell finds nothing for it: the rubric of each exercise below `rubrics/`.
-_ALL = "*.yaml"
 
 
 def rubric_file(named: Path) -> Path:
-    """Return the file of a rubric.
-
-    Args:
-        named: The file, the folder of its exercise, or `NAME.yaml` for `NAME/rubric.yaml`: each rubric was such a file
-            before exercises had folders. A file that is there is always meant itself.
-
-    Returns:
-        The rubric, or what was named if there is none.
-    """
-    folder = named.with_suffix("") if named.suffix == ".yaml" else named
-    inside = folder / RUBRIC
-    return inside if os.path.isfile(inside) and not os.path.isfile(named) else named  # noqa: PTH113 - False for any name
+    """Return the file of a rubric, which is named itself or by the folder of its exercise."""
+    inside = named / RUBRIC
+    return inside if os.path.isfile(inside) else named  # noqa: PTH113 - False for any name
 
 
 def rubrics_in(folder: Path) -> list[Path]:
     """Return the rubrics of the exercises in a folder, sorted."""
     return sorted(folder.glob(f"*/{RUBRIC}"))
-
-
-def rubric_files(named: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Return the files of rubrics, in order; `FOLDER/*.yaml` without such a file names the exercises in the folder."""
-    return tuple(file for one in named for file in _all_in(one) or (rubric_file(one),))
-
-
-def _all_in(named: Path) -> tuple[Path, ...]:
-    every = named.name == _ALL and not named.exists()
-    return tuple(rubrics_in(named.parent)) if every else ()
 
 
 def notes_on(rubric: Path) -> Path:

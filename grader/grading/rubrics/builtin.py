@@ -17,9 +17,12 @@ from grader.runtime.model.errors import RubricError
 from grader.runtime.model.wording import shown
 from grader.runtime.shipped import shipped
 
+#: The type of the messages in the recording that ships with the grader.
+ODOMETRY = "nav_msgs/msg/Odometry"
+
 
 def builtin_recording() -> Path:
-    """Return the recording that the stimulus `odometry` plays, which is in the folder of that name."""
+    """Return the recording that the stimulus `recorded` plays if it names none: a minute of a robot's odometry."""
     rubrics = shipped("rubrics")
     return next(rubrics.glob("*/odometry"), rubrics / "odometry")
 

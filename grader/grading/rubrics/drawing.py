@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeV
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag, create_model, model_validator
 from typing_extensions import TypeAliasType
 
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.types import (
     Choice,
     Duration,
@@ -41,7 +40,7 @@ from grader.runtime.model.scenario import (
     TimeBetween,
     Written,
 )
-from grader.runtime.stimuli import RecordedStream, ServiceCalls
+from grader.runtime.stimuli import ServiceCalls
 
 #: Maximum number of decimals with which a text shows a drawn number.
 DECIMALS = 9
@@ -300,18 +299,6 @@ DrawnYesNo = _drawn_as(lambda drawn: drawn.between is None and _options(drawn, b
 DrawnText = _drawn_as(
     lambda drawn: (drawn.between is None or drawn.text is not None) and _options(drawn, str), "texts to draw from"
 )
-
-
-class OdometryShape(Shape):
-    """A stimulus: `recorded` with the type nav_msgs/msg/Odometry and a recording that ships with the grader."""
-
-    topic: Topic
-    start: SomeTime = 0
-    duration: SomeLongTime
-
-    def built(self) -> RecordedStream:
-        """Return the equivalent recording."""
-        return RecordedStream(self.topic, ODOMETRY, "", build(self.start), build(self.duration))
 
 
 class ParameterShape(Shape):

@@ -12,7 +12,6 @@ from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, 
 from grader.grading.model.exercise import DUE_DATE, OPEN, ORDER, PUBLISHED, Feedback, Shows
 from grader.grading.rubrics.check_parameters import choice_model, part_model, simulation_shape
 from grader.grading.rubrics.drawing import (
-    OdometryShape,
     ParameterShape,
     SomeLongTime,
     StateShape,
@@ -43,7 +42,7 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.scenario import Connection, Span, Stimulus
 from grader.runtime.model.wording import listed
 from grader.runtime.simulation import SIMULATIONS
-from grader.runtime.stimuli import KINDS, RecordedStream, ServiceCalls, Simulated
+from grader.runtime.stimuli import KINDS, ServiceCalls, Simulated
 
 _EVENTS = (DUE_DATE, PUBLISHED)
 _EXPECTED = f"a date such as 2026-12-01, {listed(_EVENTS)}"
@@ -57,7 +56,6 @@ _LIMITS = {
 }
 #: Other keys of stimuli, below the kind that each is short for.
 _SHORT_FOR: Mapping[type[Stimulus], Mapping[str, type[Shape]]] = {
-    RecordedStream: {"odometry": OdometryShape},
     ServiceCalls: {"parameter": ParameterShape, "transition": TransitionShape, "state": StateShape},
 }
 

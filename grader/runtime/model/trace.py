@@ -399,7 +399,7 @@ class Trace:
     harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
     # Whether what the submission does may be why there is a harness problem
     suspected: bool = False
-    starts: tuple[Start, ...] = ()  # how each process was started; empty in traces of earlier versions
+    starts: tuple[Start, ...] = ()  # how each process was started
     # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()
     # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used

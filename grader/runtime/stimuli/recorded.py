@@ -56,7 +56,6 @@ def window(recording: Recording, *, duration_ns: int, seed: int) -> tuple[TimedM
     messages = recording.messages
     latest_ns = messages[-1].t_ns - duration_ns
     starts = max(1, sum(m.t_ns <= latest_ns for m in messages))
-    # The word stays the one that was hashed when only odometry was played: the same seed plays the same part.
     drawn = hashlib.sha256(f"odometry window {seed}".encode()).digest()
     first = int.from_bytes(drawn[:8], "big") % starts
     start_ns = messages[first].t_ns
@@ -99,12 +98,12 @@ class RecordedStream(Stimulus):
 
     key: ClassVar[str] = "recorded"
     becomes = PlannedRecording
-    shown: ClassVar[Mapping[str, Any]] = {"start": 0}
+    shown: ClassVar[Mapping[str, Any]] = {"start": 0, "bag": ""}
 
     topic: Topic  # topic name, absolute
     type: MessageType  # type of the messages, e.g. `sensor_msgs/msg/LaserScan`
     # The rosbag2 recording beside the rubric: a folder, or a .mcap or .db3 file. If it has no messages of this type on
-    # the topic, the topic with most of them is played.
+    # the topic, the topic with most of them is played. Without one, a minute of odometry that ships with the grader.
     bag: Annotated[str, Kind("recording")]
     start_ns: Time  # when the publisher appears and the first message is sent
     duration_ns: LongTime  # how much of the recording is played; which part is drawn from the seed

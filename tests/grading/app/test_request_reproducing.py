@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import NoReturn
 
 from click.testing import CliRunner
+from tracing import ODOMETRY
 
 from grader.cli import main
 from grader.grading.app.bags import recording_digest
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest, command_words, reproduction
-from grader.grading.model.grading_options import ODOMETRY
 from grader.runtime.stimuli.recorded import Recording, TimedMessage
 
 

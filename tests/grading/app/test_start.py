@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tracing import ODOMETRY
 
 from grader.grading.app import start
 from grader.grading.app.bags import read_given, read_recordings
@@ -13,7 +14,6 @@ from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.start import grade, may_run, opened_early
 from grader.grading.model.exercise import Location, Outcome
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.builtin import builtin_rubrics, exercise_ids
 from grader.runtime.model.errors import RecordingError, RubricError, SubmissionError
 from grader.runtime.ros_installation import find_ros

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tracing import ODOMETRY
 
 from grader.grading.app.bags import read_recordings, shipped_recording
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.builtin import (
     builtin_exercises,
     builtin_headers,

@@ -63,7 +63,8 @@ def test_times_are_drawn_between_two(scenario: Callable[..., Any]) -> None:
 observe: {duration: {between: [19 s, 21.5 s]}}
 start: {client.py: {between: [500 ms, 1 s]}}
 stimuli:
-  - odometry: {topic: /odom, start: {between: [0 s, 2 s]}, duration: {between: [9 s, 10 s]}}
+  - recorded:
+      {topic: /odom, type: nav_msgs/msg/Odometry, start: {between: [0 s, 2 s]}, duration: {between: [9 s, 10 s]}}
   - numbers:
       {topic: /a, type: std_msgs/msg/Float32, period: 200 ms, values: [1], hold: {between: [1 s, 2 s]}}
   - server: {service: /s, type: std_srvs/srv/Trigger, responses: [{}], delay: {between: [10 ms, 20 ms]}}

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from stand_in_checks import CHECKS, Everything, FieldValues, Point, Publishes, TopicRate, UsesLogger
 from tables import read_table
+from tracing import ODOMETRY
 
 from grader.grading.model.exercise import Criterion, Exercise
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.loader import MAX_MISTAKES, RubricMistakes, read_rubric
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.limits import MAX_RUBRIC_BYTES
@@ -38,7 +38,7 @@ scenarios:
           period: 200 ms
           hold: 2 s
           start: 500 ms
-      - odometry: {topic: /odom, start: 5 s, duration: 16 s}
+      - recorded: {topic: /odom, type: nav_msgs/msg/Odometry, start: 5 s, duration: 16 s}
   - id: both
     processes: [pump.py, valve.py]
     observe: {duration: 20 s}

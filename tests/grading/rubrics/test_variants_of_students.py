@@ -93,7 +93,7 @@ def sheet(tmp_path: Path) -> Callable[..., Result]:
     (tmp_path / "course.key").write_bytes(KEY)
 
     def run(*more: str) -> Result:
-        words = ["rubric", "variant", str(tmp_path / "r.yaml"), "--key-file", str(tmp_path / "course.key"), *more]
+        words = ["rubric", "variant", str(tmp_path / "r.yaml"), "--variant-key", str(tmp_path / "course.key"), *more]
         return CliRunner().invoke(app, words)
 
     return run

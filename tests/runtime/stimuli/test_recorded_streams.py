@@ -15,14 +15,13 @@ from places import GRADE
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from tiers import NIGHTLY, each, more
+from tracing import ODOMETRY
 
 from grader.course.authoring.checking import check_rubric
 from grader.course.classroom.sending import checks_of
 from grader.grading.app.bags import observed, read_given, read_recordings, recordings_digest
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest, command_words, request_of, request_to_json
-from grader.grading.evidence.manifest import scenario_digest
-from grader.grading.model.grading_options import ODOMETRY
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.errors import RecordingError, RubricError
 from grader.runtime.model.quantities import NS_PER_S
@@ -224,20 +223,13 @@ def test_what_is_read_and_its_digest(tmp_path: Path) -> None:
     assert own != recordings_digest(read_given(other, read_recordings(other, exercises)))
 
 
-def test_evidence_of_odometry_is_still_known() -> None:
-    """The scenario of exercise 2 has the digest that it always had, however its recording is named."""
-    (exercise,) = read_exercises(GradeRequest("x", exercises=("odom_subscriber",)))
-    (scenario,) = exercise.scenarios
-    assert scenario_digest(scenario) == "sha256:1310d288a10b4db70776e9a0d68fef53acbe7a9e2d1828ffd65c89c472f32b5c"
-
-
 def test_a_request_comes_back(tmp_path: Path) -> None:
-    """As JSON in evidence; the key of the older option is kept."""
+    """As JSON in evidence."""
     asked = request(tmp_path / "r.yaml", (ODOMETRY, Path("drive")), ("/scan", Path("scans")))
     data = json.loads(json.dumps(request_to_json(asked)))
-    assert (data["odom_bag"], data["recordings"]) == ("drive", {"/scan": "scans"})
+    assert data["recordings"] == {ODOMETRY: "drive", "/scan": "scans"}
     assert request_of(data, submission="ada", seed=7, rubrics=asked.rubrics).bags == asked.bags
-    assert "--odom-bag drive --recording /scan=scans" in " ".join(command_words(asked, 7))
+    assert f"--recording {ODOMETRY}=drive --recording /scan=scans" in " ".join(command_words(asked, 7))
 
 
 def test_the_topic_comes_before_the_type(tmp_path: Path) -> None:
@@ -347,10 +339,9 @@ def test_a_type_of_the_courses_own(tmp_path: Path) -> None:
 
 
 def test_without_a_rubric(tmp_path: Path) -> None:
-    """`grade observe` finds the type of a topic, and the topic of a type; the older option plays on /odom."""
+    """`grade observe` finds the type of a topic, and the topic of a type."""
     bag = write_bag(tmp_path / "bag", {**SCANS, **POSES})
     assert observed([("/scan", bag)], 1, 2) == (RecordedStream("/scan", SCAN, str(bag), 1, 2),)
     assert observed([(POSE, bag)], 1, 2) == (RecordedStream("/pose", POSE, str(bag), 1, 2),)
-    assert observed([(ODOMETRY, bag)], 1, 2)[0].topic == "/odom"
     with pytest.raises(RecordingError, match=r"expected one topic to play, found /pose \(.*\) and /scan"):
         observed([("/other", bag)], 1, 2)
