@@ -16,7 +16,7 @@ Version: TypeAlias = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class Dependency:
     """A program whose weaknesses a student's process could reach."""
 
     name: str
@@ -32,19 +32,19 @@ class Program:
 
 #: Sources: the release notes of Fast DDS, the advisories of bubblewrap, and the records of the Linux kernel at cve.org,
 #: as of October 2026.
-BUBBLEWRAP = Program(
+BUBBLEWRAP = Dependency(
     "bubblewrap",
     ((0, 12, 0),),
     "the grader has it create no file below a student's files, and it needs no setuid",
     "bubblewrap {version} or newer",
 )
-FAST_DDS = Program(
+FAST_DDS = Dependency(
     "Fast DDS",
     ((2, 6, 12), (2, 14, 7), (3, 2, 5)),
     "a malformed packet reaches the worker alone, which has a sandbox and limits of its own and is replaced",
     "a build of ROS with Fast DDS {version} or newer (wheels: pip install --upgrade ros-fastrtps)",
 )
-LINUX = Program(
+LINUX = Dependency(
     "Linux",
     (
         *((5, 10, 255), (5, 15, 206), (6, 1, 172), (6, 6, 138)),
@@ -78,7 +78,7 @@ def kernel_version(release: str, build: str) -> Version:
     return () if len(version) > 2 and version[2] == 0 and "-" in release else version
 
 
-def outdated(versions: Mapping[Program, Version]) -> Iterator[Fact]:
+def outdated(versions: Mapping[Dependency, Version]) -> Iterator[Fact]:
     """Yield each program that is not sound, with its update; an empty version is unknown."""
     for program, version in versions.items():
         wanted = program.wanted_for(version) if version else None

@@ -36,7 +36,7 @@ class ParameterRejected(AssertionError):  # noqa: N818 - the same
 
 
 class WrongType(AssertionError):  # noqa: N818 - the same
-    """A program publishes messages of another type than the test expects."""
+    """A program and the test use one name with different types, or with QoS that never fits: nothing would arrive."""
 
 
 class NoMessage(IndexError):  # noqa: N818 - the same

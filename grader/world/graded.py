@@ -18,16 +18,19 @@ from typing import Any
 
 import pytest
 
+from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
+from grader.grading.model.exercise import Finding
 from grader.grading.model.wording import listed, nearest
 from grader.runtime.message_classes import built, message_class
 from grader.runtime.model.author_files import line_of, words_of
 from grader.runtime.model.errors import GraderError, HarnessError, SubmissionError
 from grader.runtime.model.scenario import is_launch_file
-from grader.runtime.model.trace import Message
+from grader.runtime.model.trace import Message, unmet_policy
 from grader.runtime.plan import Plan, PlannedStart, derive
 from grader.runtime.recording.codec import from_json, observation_to_json, to_json
 from grader.runtime.session import TestJob, WorkerLostError
 from grader.runtime.steps import LaunchFailedError
+from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.programs import Found, Runnable
 from grader.world.world import World
@@ -164,6 +167,31 @@ class GradedWorld(World):
                 raise
             raise LaunchFailed(error.message) from None
 
+    @property
+    def advice(self) -> str:
+        """One thing to do about messages of the test that do not arrive: the submission has to hear them."""
+        return next((found.hint for found in self._unheard() if found.hint), "")
+
+    def _unheard(self) -> Iterator[Finding]:
+        for offer in self._offers.values():
+            same = [e for e in self._graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
+            fitting = [e for e in same if e.type == offer.type]
+            if not fitting:
+                yield explain_no_subscription(self.trace(), offer.topic, offer.type)
+            for unmet in filter(None, (unmet_policy(offer, end) for end in fitting)):
+                yield not_met(f"{offer.topic}: no message arrives", hint=f"subscribe to {offer.topic} with {unmet[0]}")
+
+    def _silence(self, topic: str) -> NoMessage:
+        found = explain_no_message(self.trace(), topic, None)
+        return NoMessage(found.reason, found.hint)
+
+    def _no_server(self, service: str, interface: str) -> str:
+        node, _, name = service.rpartition("/")
+        if name in telling.OF_EVERY_NODE and node not in self._graph.nodes:
+            return super()._no_server(service, interface)
+        found = explain_no_server(self.trace(), service, interface)
+        return f"{found.reason}\n  hint: {found.hint}" if found.hint else found.reason
+
     def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
         return replace(
             self._plan,
@@ -292,7 +320,9 @@ def _of_programs(error: BaseException, world: GradedWorld | None) -> dict[str, A
         return {"reason": str(error).rpartition("\n")[2], "fault": fault}
     if isinstance(error, (StepTimeout, NoMessage)):
         return {"reason": error.reason, "hint": error.hint}
-    return {"reason": str(error)} if isinstance(error, (ParameterRejected, WrongType, LaunchFailed)) else None
+    if isinstance(error, WrongType):
+        return {"reason": str(error), "hint": world.advice if world is not None else ""}
+    return {"reason": str(error)} if isinstance(error, (ParameterRejected, LaunchFailed)) else None
 
 
 def _is_generated(failure: pytest.ExceptionInfo[BaseException]) -> bool:

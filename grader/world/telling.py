@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import linecache
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
-from grader.grading.model.exercise import Finding
 from grader.grading.model.wording import listed, moment, nearest, quote, span
 from grader.runtime.model.trace import (
     Delivery,
@@ -23,9 +22,9 @@ from grader.runtime.model.trace import (
     Request,
     Response,
     ServiceEnd,
-    Trace,
     unmet_policy,
 )
+from grader.runtime.simulation import Simulation
 from grader.world.errors import NoMessage, StepTimeout
 from grader.world.programs import Program
 
@@ -65,58 +64,103 @@ def _source(path: Path, line: int) -> list[str]:
     return [f"    {text}"] if text else []
 
 
-def silence(trace: Trace, topic: str) -> NoMessage:
-    """Return an error that says why no message came on a topic, with what to do about it if that is known."""
-    found = explain_no_message(trace, topic, None)
-    return NoMessage(found.reason, found.hint)
-
-
-def no_server(trace: Trace, service: str, type_: str) -> str:
-    """Return why nobody offers a service; of one that every node has, whether there is the node."""
-    node, _, name = service.rpartition("/")
-    nodes = _graph_of(trace).nodes
-    if name in OF_EVERY_NODE and node not in nodes:
-        close = nearest(node, nodes)
-        return f"there is no node {node}" + (f"\n  hint: did you mean {close}?" if close else "")
-    return _worded(explain_no_server(trace, service, type_))
-
-
-def _worded(finding: Finding) -> str:
-    return f"{finding.reason}\n  hint: {finding.hint}" if finding.hint else finding.reason
-
-
-def unheard(trace: Trace, offers: Iterable[Endpoint]) -> Iterator[str]:
-    """Yield why messages of the test do not arrive: another name, another type, or QoS that does not fit.
+def silence(graph: GraphSnapshot, topic: str, now_ns: int, other: str) -> NoMessage:
+    """Return an error that says why no message of a program came on a topic; neither side is taken to be wrong.
 
     Args:
-        trace: The run so far.
-        offers: The publishers of the test.
+        graph: The graph now.
+        topic: Its name.
+        now_ns: The time since the test began.
+        other: Who else publishes on the topic: the test, or a simulation; empty for nobody.
     """
-    yield from map(_worded, _unheard(trace, offers))
+    publishers = [end for end in graph.endpoints if end.kind == "publisher"]
+    nodes = sorted({end.node for end in publishers if end.topic == topic})
+    if nodes:
+        end = ": let time pass" if now_ns == 0 else ""
+        return NoMessage(f"{topic}: no message of {listed(nodes)} yet at {moment(now_ns)}{end}")
+    if other:
+        return NoMessage(f"{topic}: only {other} publishes on it; these are the messages of programs")
+    topics = sorted({end.topic for end in publishers})
+    close = nearest(topic, topics)
+    known = f"; there are {listed(topics)}" if topics and not close else ""
+    return NoMessage(f"{topic}: no program publishes on it{known}", f"did you mean {close}?" if close else "")
 
 
-def advice(trace: Trace, offers: Iterable[Endpoint]) -> str:
-    """Return one thing to do about messages of the test that do not arrive; empty if all do, or nothing is known."""
-    return next((found.hint for found in _unheard(trace, offers) if found.hint), "")
+def no_server(graph: GraphSnapshot, service: str) -> str:
+    """Return why nobody offers a service; of one that every node has, whether there is the node."""
+    node, _, name = service.rpartition("/")
+    if name in OF_EVERY_NODE and node not in graph.nodes:
+        what, close = f"there is no node {node}", nearest(node, graph.nodes)
+    else:
+        what, close = (
+            f"nobody offers {service}",
+            nearest(service, {end.service for end in service_ends(graph, "service")}),
+        )
+    return what + (f"\n  hint: did you mean {close}?" if close else "")
 
 
-def _unheard(trace: Trace, offers: Iterable[Endpoint]) -> Iterator[Finding]:
-    graph = _graph_of(trace)
-    for offer in offers:
-        same = [e for e in graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
-        fitting = [e for e in same if e.type == offer.type]
-        if not fitting:
-            yield explain_no_subscription(trace, offer.topic, offer.type)
-            continue
-        for end in fitting:
-            if (unmet := unmet_policy(offer, end)) is not None:
-                offered, wanted = unmet
-                what = f"{end.node} asks for {wanted}, the test offers {offered}: no message arrives"
-                yield not_met(f"{offer.topic}: {what}", hint=f"subscribe to {offer.topic} with {offered}")
+def unheard(graph: GraphSnapshot, topics: Iterable[str]) -> Iterator[str]:
+    """Yield the topics of the test that no program subscribes to, each with one that may be meant."""
+    for topic, close in _unheard(graph, topics):
+        yield f"{topic}: no program subscribes to it" + (f"; did you mean {close}?" if close else "")
 
 
-def _graph_of(trace: Trace) -> GraphSnapshot:
-    return (trace.graphs() or (GraphSnapshot(0, (), ()),))[-1]
+def advice(graph: GraphSnapshot, topics: Iterable[str]) -> str:
+    """Return what may be meant by a topic of the test that no program subscribes to; empty if nothing is alike."""
+    return next((f"did you mean {close}?" for _, close in _unheard(graph, topics) if close), "")
+
+
+def _unheard(graph: GraphSnapshot, topics: Iterable[str]) -> Iterator[tuple[str, str]]:
+    heard = {end.topic for end in graph.endpoints if end.kind == "subscription"}
+    for topic in topics:
+        if topic not in heard:
+            yield topic, nearest(topic, heard) or ""
+
+
+class Sides(NamedTuple):
+    """What the test or a simulation does: the ends of its publishers, and types of what it hears and serves by name."""
+
+    publishers: Iterable[Endpoint]
+    hears: Mapping[str, str]
+    serves: Mapping[str, str]
+    who: str = "the test"
+
+
+def sides_of(simulation: Simulation) -> Sides:
+    """Return what a simulation does; its publishers are reliable and volatile."""
+    published = simulation.publishes().items()
+    ends = [
+        Endpoint("publisher", topic, kind, "the simulation", -1, "reliable", "transient_local")
+        for topic, kind in published
+    ]
+    return Sides(ends, simulation.hears(), simulation.serves(), "the simulation")
+
+
+def mismatches(graph: GraphSnapshot, sides: Iterable[Sides]) -> Iterator[str]:
+    """Yield what never arrives although a program uses the same name: types that differ, and QoS that never fits.
+
+    A name that one program uses in the right way is left out.
+    """
+    for one in sides:
+        for offer in one.publishers:
+            same = [e for e in graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
+            yield from _mismatch(same, offer.topic, offer.type, f"{offer.node} publishes", "subscribes to")
+            fitting = [(e, unmet_policy(offer, e)) for e in same if e.type == offer.type]
+            if fitting and all(unmet for _, unmet in fitting):
+                end, unmet = fitting[0]
+                offered, wanted = unmet or ("", "")
+                yield f"{offer.topic}: {end.node} asks for {wanted}, {offer.node} offers {offered}: no message arrives"
+        for topic, kind in one.hears.items():
+            same = [e for e in graph.endpoints if (e.kind, e.topic) == ("publisher", topic)]
+            yield from _mismatch(same, topic, kind, f"{one.who} hears", "publishes")
+        for service, kind in one.serves.items():
+            clients = [e for e in service_ends(graph, "client") if e.service == service]
+            yield from _mismatch(clients, service, kind, f"{one.who} serves", "has a client of")
+
+
+def _mismatch(ends: Sequence[Endpoint | ServiceEnd], name: str, kind: str, here: str, there: str) -> Iterator[str]:
+    if ends and all(end.type != kind for end in ends):
+        yield f"{name}: {here} {kind}, {ends[0].node} {there} {ends[0].type}"
 
 
 def apart(graph: GraphSnapshot) -> Iterator[str]:

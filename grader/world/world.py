@@ -214,6 +214,8 @@ class World:
         self._expected: list[Failure] = []
         self._failing: list[tuple[Program, Fault]] = []
         self._simulations: list[Simulation] = []
+        self._fits = True  # whether nothing has changed since it was looked at whether types and QoS fit
+        self._mismatches: set[str] = set()
         self._goals = 0
         self._random: Random | None = None
         self._starting = self._judging = False
@@ -406,8 +408,8 @@ class World:
             self._judging = False
 
     def _timeout(self, what: str, since_ns: int, first: Mapping[str, Iterable[str]], hint: str = "") -> StepTimeout:
-        trace, programs = self.trace(), [*self._programs.values()]
-        apart = [*telling.unheard(trace, self._offers.values()), *telling.apart(self._graph)]
+        programs = [*self._programs.values()]
+        apart = [*telling.unheard(self._graph, self._offers), *telling.apart(self._graph)]
         sections = {
             **first,
             "meanwhile": [*telling.meanwhile(self._observations, programs, since_ns)],
@@ -418,8 +420,8 @@ class World:
 
     @property
     def advice(self) -> str:
-        """One thing to do about messages of the test that do not arrive; empty if all do, or nothing is known."""
-        return telling.advice(self.trace(), self._offers.values())
+        """What may be meant where a message of the test has no subscription; empty if all have, or nothing is alike."""
+        return telling.advice(self._graph, self._offers)
 
     # --------------------------------------------------------------- acting
 
@@ -433,6 +435,9 @@ class World:
             message: The message. With a rate also a list: sent in turn, and the last one is repeated.
             rate: Messages per second; None to publish once.
             qos: Reliability and durability of the publisher; reliable and volatile by default.
+
+        Raises:
+            WrongType: A program subscribes to the topic, and no message would ever arrive.
         """
         __tracebackhide__ = True
         topic = _absolute(topic)
@@ -455,6 +460,7 @@ class World:
             latched=durability == "transient_local",
         )
         self._offers[topic] = Endpoint("publisher", topic, command.type, "the test", -1, reliability, durability)
+        self._fits = False
         self._perform(command)
 
     def stop_publishing(self, topic: str) -> None:
@@ -473,6 +479,9 @@ class World:
             type: The class of the service, such as `std_srvs.srv.Trigger`.
             function: Called with each request while virtual time stands still; returns the response. It may look at
                 everything, but not let time pass.
+
+        Raises:
+            WrongType: A program has a client of another type.
         """
         __tracebackhide__ = True
         name = _absolute(name)
@@ -481,6 +490,7 @@ class World:
         if known is not None and type_name(known[0]) != interface:
             raise ValueError(f"{name}: expected {type_name(known[0])}, as it is served already, found {interface}")
         self._functions[name] = (service_type(interface), function)
+        self._fits = False
         self._perform(Serve(name, interface))
 
     def call(self, name: str, request: Any, *, timeout: float = 10.0) -> Any:
@@ -492,11 +502,13 @@ class World:
             timeout: Seconds to wait at most, for the server and the response together.
 
         Raises:
+            WrongType: The server is of another type.
             StepTimeout: There was no response in time; the message says whether there is a server.
         """
         __tracebackhide__ = True
         name = _absolute(name)
         interface, kind = type_of_part(request, "Request", name)
+        self._refuse_other_server(name, interface, name)
         since_ns, seen = self._begin_ns(), len(self._observations)
         told = self._perform(CallService(name, interface, plain_fields(request)))
 
@@ -504,11 +516,7 @@ class World:
         if found is not None:
             return built(kind.Response, found.value, name)
         offered = any((e.service, e.type) == (name, interface) for e in telling.service_ends(self._graph, "service"))
-        why = (
-            f"{name} has a server, which has not answered"
-            if offered
-            else telling.no_server(self.trace(), name, interface)
-        )
+        why = f"{name} has a server, which has not answered" if offered else self._no_server(name, interface)
         raise self._timeout(f"{name} did not answer", since_ns, {"the service": [why]})
 
     def send_goal(
@@ -523,11 +531,13 @@ class World:
             timeout: Seconds to wait at most.
 
         Raises:
+            WrongType: The action is of another type.
             StepTimeout: There was no result in time.
         """
         __tracebackhide__ = True
         name = _absolute(name)
         interface, kind = type_of_part(goal, "Goal", name)
+        self._refuse_other_server(f"{name}/_action/send_goal", f"{interface}_SendGoal", name)
         self._goals += 1
         uuid = tuple(bytes.fromhex(derive(self._seed, "goal", str(self._goals))[:32]))
         after_ns = 0 if cancel_after is None else max(1, round(cancel_after * NS_PER_S))
@@ -595,6 +605,9 @@ class World:
 
         Returns:
             The simulation, whose state the test may look at.
+
+        Raises:
+            WrongType: A program uses one of its topics or services with another type.
         """
         __tracebackhide__ = True
         if isinstance(simulation, str):
@@ -603,6 +616,7 @@ class World:
         self._simulations.append(simulation)
         simulation.begin(Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
         offers = simulation.publishes(), simulation.hears(), simulation.serves()
+        self._fits = False
         self._perform(Simulate(number, simulation.period, *map(dict, offers)))
         return simulation
 
@@ -630,7 +644,7 @@ class World:
                 raise WrongType(f"{topic}: expected messages of type {expected}, found {other}")
         for one in found[len(known) :]:
             known.append(Received(seconds(one.t_ns), self._as_object(one)))
-        return Messages(known, lambda: telling.silence(self.trace(), topic))
+        return Messages(known, lambda: self._silence(topic))
 
     def messages(self, topic: str, type: Any = None) -> list[Any]:  # noqa: A002 - as in rclpy
         """Return the messages that programs have published on a topic so far.
@@ -644,7 +658,17 @@ class World:
         """
         __tracebackhide__ = True
         found = self.received(topic, type)
-        return Messages([one.message for one in found], lambda: telling.silence(self.trace(), _absolute(topic)))
+        return Messages([one.message for one in found], lambda: self._silence(_absolute(topic)))
+
+    def _silence(self, topic: str) -> NoMessage:
+        others = {name: "a simulation" for one in self._simulations for name in one.publishes()}
+        others |= dict.fromkeys(self._offers, "the test")
+        return telling.silence(self._graph, topic, self._run.now_ns, others.get(topic, ""))
+
+    def _no_server(self, service: str, interface: str) -> str:
+        """Return why nobody offers a service of a type."""
+        del interface  # it is told where there is a server of another one
+        return telling.no_server(self._graph, service)
 
     def _as_object(self, message: Message) -> Any:
         return read(message)
@@ -817,6 +841,7 @@ class World:
         if self._run.full:
             raise GraderError(f"the test was ended: {self._run.full}")
         self._raise_failure()
+        self._raise_mismatch()
         return told
 
     def _catch_up(self) -> None:
@@ -836,7 +861,7 @@ class World:
             if isinstance(one, Message):
                 self._messages.setdefault(one.topic, []).append(one)
             elif isinstance(one, GraphSnapshot):
-                self._graph = one
+                self._graph, self._fits = one, False
             elif isinstance(one, (LogRecord, OutputLine, Fault)) and one.process in self._programs:
                 program = self._programs[one.process]
                 program._note(one)  # noqa: SLF001 - a program is told by its world alone
@@ -855,6 +880,28 @@ class World:
             innermost = self._expected[-1]
             if innermost.program is None:
                 innermost.program, innermost.fault = program, fault
+
+    def _raise_mismatch(self) -> None:
+        """Raise WrongType, once, for what never arrives although both sides use the same name."""
+        __tracebackhide__ = True
+        if self._fits:
+            return
+        self._fits = True
+        served = {name: type_name(kind) for name, (kind, _) in self._functions.items()}
+        of_test = telling.Sides(self._offers.values(), {}, served)
+        for found in telling.mismatches(self._graph, [of_test, *map(telling.sides_of, self._simulations)]):
+            if found not in self._mismatches:
+                self._mismatches.add(found)
+                raise WrongType(found)
+
+    def _refuse_other_server(self, service: str, interface: str, name: str) -> None:
+        """Raise WrongType if all servers of a service are of another type than the test calls it with."""
+        __tracebackhide__ = True
+        self._catch_up()
+        servers = [end for end in telling.service_ends(self._graph, "service") if end.service == service]
+        if servers and all(end.type != interface for end in servers):
+            one, expected = servers[0], interface.removesuffix("_SendGoal")
+            raise WrongType(f"{name}: {one.node} offers {one.type.removesuffix('_SendGoal')}, the test uses {expected}")
 
     def _answered(self, question: Mapping[str, Any]) -> Any:
         """Answer a question of the worker: what a simulation does, or what a served function responds."""

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from grader.runtime.outdated import BUBBLEWRAP, FAST_DDS, LINUX, Program, Version, kernel_version, outdated, version_of
+from grader.runtime.outdated import (
+    BUBBLEWRAP,
+    FAST_DDS,
+    LINUX,
+    Dependency,
+    Version,
+    kernel_version,
+    outdated,
+    version_of,
+)
 
 
 @pytest.mark.parametrize(
@@ -24,7 +33,9 @@ from grader.runtime.outdated import BUBBLEWRAP, FAST_DDS, LINUX, Program, Versio
         (LINUX, "8.0.1", None),
     ],
 )
-def test_a_version_is_sound_from_one_of_its_branch_on(program: Program, version: str, wanted: Version | None) -> None:
+def test_a_version_is_sound_from_one_of_its_branch_on(
+    program: Dependency, version: str, wanted: Version | None
+) -> None:
     """Or from the newest one on, if its branch was given up."""
     assert program.wanted_for(version_of(version)) == wanted
 
@@ -59,7 +70,7 @@ def test_the_version_of_a_kernel_is_that_of_its_source(release: str, build: str,
 
 
 @pytest.mark.parametrize("program", [BUBBLEWRAP, FAST_DDS, LINUX])
-def test_branches_are_told_once_and_in_order(program: Program) -> None:
+def test_branches_are_told_once_and_in_order(program: Dependency) -> None:
     """The last one counts for what has no branch of its own."""
     branches = [sound[:2] for sound in program.sound]
     assert branches == sorted(set(branches))

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from places import ROOT, TESTS
 from std_srvs.srv import SetBool
-from test_msgs.action import Fibonacci
+from test_msgs.action import Fibonacci, NestedMessage
 
 from grader.api import Moment, Output, Simulation
 from grader.runtime.model.errors import HarnessError, SubmissionError
-from grader.world.errors import ParameterRejected, StepTimeout
+from grader.world.errors import ParameterRejected, StepTimeout, WrongType
 from grader.world.opening import Worlds
 from grader.world.world import World
 
@@ -38,6 +38,16 @@ def test_a_goal_has_feedback_and_a_result(ros: World, fibonacci_server: Path) ->
         assert (outcome.accepted, outcome.status, list(outcome.result.sequence)) == (True, 4, numbers)
         assert [list(one.message.sequence) for one in outcome.feedback] == [numbers[: n + 3] for n in range(order - 1)]
         assert ros.now - began == pytest.approx(0.5 * (order - 1), abs=1e-4)
+
+
+def test_a_goal_of_another_type_is_an_error(ros: World, fibonacci_server: Path) -> None:
+    """No server would ever answer it."""
+    ros.run(fibonacci_server)
+    words = (
+        "/fibonacci: /fibonacci_server offers test_msgs/action/Fibonacci, the test uses test_msgs/action/NestedMessage"
+    )
+    with pytest.raises(WrongType, match=words):
+        ros.send_goal("/fibonacci", NestedMessage.Goal())
 
 
 def test_a_goal_may_be_cancelled_or_refused(ros: World, fibonacci_server: Path) -> None:

@@ -207,7 +207,9 @@ CheckFile = Annotated[
 #: A folder of interface packages, or a recording, under the same rules.
 BESIDE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*/?"
 InterfaceFolder = Annotated[str, MatchingText(BESIDE, "a folder beside the rubric such as interfaces", "interfaces")]
-RecordingPath = Annotated[str, MatchingText(BESIDE, "a recording beside the rubric such as bags/scan", "bags/scan")]
+RecordingPath = Annotated[
+    str, MatchingText(f"(?:{BESIDE})?", "a recording beside the rubric such as bags/scan", "bags/scan")
+]
 Number = Annotated[Text, BeforeValidator(_as_text)]
 Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]
 #: Unlike other numbers, a field may be `.nan` or `.inf`: sensors send them.

@@ -139,7 +139,7 @@ def test_who_waits_for_somebody_is_given_something() -> None:
     kinds = {s.parameters.get("topic") or s.parameters["service"]: s.kind for s in stimuli_for(builder.trace(), 10)}
     assert kinds == {
         "/level": "numbers",
-        "/odom": "odometry",
+        "/odom": "recorded",
         "/goal": "messages",
         "/empty": "calls",
         "/fill": "server",

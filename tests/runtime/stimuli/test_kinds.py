@@ -25,8 +25,6 @@ ABOUT = {
         "grading/evidence/manifest.py",
         "grading/model/exercise.py",
         "runtime/plan.py",
-        "grading/rubrics/drawing.py",
-        "grading/rubrics/model.py",
     },
     "ServiceCalls": {"grading/rubrics/drawing.py", "grading/rubrics/model.py"},
     "Simulated": {
