@@ -169,6 +169,7 @@ class World:
 
     Attributes:
         session: What the programs run in.
+        left_out: Sentences about what launch files describe and was not started, in the order in which they were told.
     """
 
     def __init__(  # noqa: PLR0913 - the options of the marker
@@ -216,6 +217,7 @@ class World:
         self._simulations: list[Simulation] = []
         self._fits = True  # whether nothing has changed since it was looked at whether types and QoS fit
         self._mismatches: set[str] = set()
+        self.left_out: list[str] = []
         self._goals = 0
         self._random: Random | None = None
         self._starting = self._judging = False
@@ -288,6 +290,7 @@ class World:
         given = tuple((name, str(value)) for name, value in (arguments or {}).items())
         start = PlannedStart(found.name, launch_arguments=given, known=known, provided=self._provided)
         told = self._perform(StartProcesses(self._plan_of(found, start, {}), settle=not self._plan.drawn_order))
+        self.left_out += told["left_out"]
         return Launched([self._programs[name] for name in told["started"]], told["left_out"])
 
     #: Name and text of files that a launch file may need, beside those that lie around it.

@@ -352,3 +352,31 @@ def test_a_message_package_beside_the_test_is_not_taken_for_a_folder(suite: pyte
     )
     (suite.path / "sayer.py").write_text(SAYER, encoding="utf-8")
     run(suite, BESIDE).assert_outcomes(passed=1)
+
+
+def test_what_a_launch_file_has_and_was_not_started_is_told(suite: pytest.Pytester) -> None:
+    """With the failure of a test, and as a warning of one that passes."""
+    suite.makefile(
+        ".launch.py",
+        demo="""
+from launch import LaunchDescription
+from launch.actions import RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    camera = Node(package="usb_cam", executable="usb_cam_node")
+    after = RegisterEventHandler(OnProcessExit(target_action=camera, on_exit=[]))
+    return LaunchDescription([Node(package="demo", executable="echo.py"), camera, after])
+""",
+    )
+    suite.makepyfile(
+        test_it="def test_it(ros):\n    ros.launch('demo.launch.py')\n    ros.advance(1.0)\n"
+        "def test_that(ros):\n    ros.launch('demo.launch.py')\n    assert ros.now == 1.0\n"
+    )
+    result = suite.runpytest_subprocess("-p", "grader.pytest_plugin", "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=1, failed=1, warnings=2)
+    failure, _, warning = result.stdout.str().partition("warnings summary")
+    for text in (failure, warning):
+        assert "the action RegisterEventHandler is not supported" in text
