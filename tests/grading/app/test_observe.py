@@ -414,7 +414,7 @@ class Recorder:
     def record(self, jobs: Mapping[str, Job], clock: str, progress: object) -> dict[str, Trace]:
         """Return a trace for each job."""
         self.clocks.append(clock)
-        return {key: replace(a_trace(), harness_problem=self.problem) for key in jobs}
+        return {key: replace(a_trace(), harness_problem=self.problem, clock_reason="it works") for key in jobs}
 
 
 @pytest.mark.parametrize("problem", ["", "no worker can be started"])
@@ -427,6 +427,19 @@ def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(
     assert session.clocks == ["virtual"]
     assert found == held_up if problem else found.clock is ClockKind.VIRTUAL
     assert problem or found.notes == (f"{observing._TOO_BUSY} clock: a.py: it works",)
+    assert problem or not found.clock_reason  # it is in the note
+
+
+def test_a_reason_for_another_clock_is_not_told_as_the_reason_for_virtual_time() -> None:
+    """Where virtual time was asked for, the text says what it does not suit."""
+    told = []
+    for clock in ClockKind:
+        trace = replace(a_trace(), clock=clock, clock_reason="a.py: it waits")
+        told.append(render_summary(summarise(trace, ["a.py"], "none")).splitlines()[1])
+    assert told == [
+        "  note: virtual time does not suit what was observed: a.py: it waits",
+        "  note: recorded on the wall clock: a.py: it waits",
+    ]
 
 
 ACTION = """class Count(Node):
