@@ -125,3 +125,18 @@ def test_a_right_file_alone_gets_all_of_its_points() -> None:
     assert result.stdout.startswith("velocity_publisher.py: 30 of 30 points\n")
     assert "Fix first" not in result.stdout
     assert result.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "options", "told"), [("none", (), True), ("auto", (), False), ("none", ("--isolation", "none"), False)]
+)
+def test_a_sandbox_that_is_not_read_for_a_class_is_named(
+    tmp_path: Path, value: str, options: tuple[str, ...], told: bool
+) -> None:
+    """A class is not graded without a sandbox because of a variable that was set for something else."""
+    (tmp_path / "class").mkdir()
+    words = ["batch", str(tmp_path / "class"), "-o", str(tmp_path / "out"), *options]
+    result = CliRunner().invoke(main.app, words, env={"GRADER_ISOLATION": value})
+    assert result.exit_code == 2  # nobody handed in anything
+    said = "note: GRADER_ISOLATION is not read for a class: give --isolation none instead"
+    assert (said in result.output) == told

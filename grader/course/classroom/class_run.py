@@ -170,7 +170,7 @@ def _kept_options(course: ClassRequest, adjustments: Adjustments) -> LastRun:
 
 
 def _places(sources: Sequence[Path]) -> tuple[str, ...]:
-    return tuple(str(source.resolve()) for source in sources)
+    return tuple(dict.fromkeys(str(source.resolve()) for source in sources))
 
 
 def _warn_of_another_class(course: ClassRequest, store: Store, intake: Intake, warn: Callable[[str], None]) -> None:

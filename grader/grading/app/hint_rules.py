@@ -68,6 +68,7 @@ def try_rules(folder: Path, rubrics: tuple[Path, ...] = ()) -> list[RuleTrial]:
             one.verdict.outcome.value,
             one.verdict.reason,
             tuple((rule.id, rule.priority, _place(clue), _hint(clue)) for rule, clue in one.clues),
+            tuple(rule.id for rule in one.silent),
         )
         for one in tried
     ]

@@ -120,7 +120,7 @@ def _in_virtual_time(
     if whole.harness_problem:
         return held_up
     why = f": {held_up.clock_reason}" if held_up.clock_reason else ""
-    return replace(whole, notes=(f"{_TOO_BUSY} clock{why}", *whole.notes))
+    return replace(whole, clock_reason="", notes=(f"{_TOO_BUSY} clock{why}", *whole.notes))
 
 
 def _sources(trace: Trace, submission: Submission) -> dict[str, str]:

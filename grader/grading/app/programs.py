@@ -25,6 +25,7 @@ from grader.runtime.programs.executables import (
     name_of,
     needed_packages,
     package_of,
+    project_folders,
     words_of,
     workspace_of,
 )
@@ -168,7 +169,7 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
     folder = Path(os.path.commonpath([target.folder for target in targets]))
     package = package_of(folder)
     workspace = workspace_of(package)
-    notes: tuple[str, ...] = tuple(_ignored(package, workspace)) if is_package(package) else ()
+    notes: tuple[str, ...] = tuple(_ignored(targets, package, workspace))
     for place, root in enumerate(dict.fromkeys((workspace, package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()
@@ -198,14 +199,20 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
     return replace(_stage_apart(targets, alone), notes=notes)
 
 
-def _ignored(package: Path, workspace: Path) -> Iterator[str]:
-    """Yield a sentence for each package that one names, and that colcon would not build."""
-    if workspace == package:  # all others may be ignored
-        workspace = next((up for up in package.parents if up.name == "src"), package.parent)
-    ignored = ignored_packages(workspace)
-    named = words_of(package) if ignored else frozenset()
+def _ignored(targets: Sequence[Target], package: Path, workspace: Path) -> Iterator[str]:
+    """Yield a sentence for each package that those of the programs name, and that colcon would not build."""
+    if is_package(package):
+        packages = [package]
+        if workspace == package:  # all others may be ignored
+            workspace = next((up for up in package.parents if up.name == "src"), package.parent)
+    else:
+        wanted = {target.name.split("/")[0] for target in targets if target.file is None}
+        packages = [folder for folder in project_folders(workspace) if name_of(folder) in wanted] if wanted else []
+    ignored = ignored_packages(workspace) if packages else {}
+    named = {word for one in packages for word in words_of(one)} if ignored else set()
+    around = {folder for one in packages for folder in (one, *one.parents)}
     for name, folder in ignored.items():
-        if name in named and folder not in (package, *package.parents):
+        if name in named and folder not in around:
             where = (folder / IGNORED).relative_to(workspace).as_posix()
             yield f"the package {name} was left out, as colcon does: there is a file {where}"
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, field, replace
 from fractions import Fraction
 
 from grader.grading.judging.diagnosis import cases_of, clues_for, diagnose, placed, rules_of
-from grader.grading.judging.diagnosis.rules import Clue, Rule
+from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, is_asked
 from grader.grading.judging.figures import excerpts_for, illustrated
 from grader.grading.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
 from grader.grading.judging.run_check import Answer, check_name, run_check
@@ -39,6 +39,7 @@ class TriedRules:
     criterion: str  # as `exercise/criterion`
     verdict: Verdict  # without a cause
     clues: tuple[tuple[Rule, Clue], ...]  # in the order of the rules: reports show the first
+    silent: tuple[Rule, ...]  # the exercise's own that were asked and return nothing
 
 
 def judge_run(
@@ -133,11 +134,14 @@ def tried_rules(exercise: Exercise, run: Run, mistakes: list[AuthorMistake]) -> 
     verdicts, facts = undiagnosed(exercise, traces, run.submission, run.sources)
     cases = cases_of(verdicts, exercise, traces, run.submission, run.sources, facts)
     rules = rules_of(exercise) if any(cases) else ()
-    return tuple(
-        TriedRules(f"{exercise.id}/{case.criterion.id}", case.verdict, tuple(clues_for(case, rules, mistakes)))
-        for case in cases
-        if case is not None
-    )
+    return tuple(_tried(exercise, case, rules, mistakes) for case in cases if case is not None)
+
+
+def _tried(exercise: Exercise, case: Case, rules: Sequence[Rule], mistakes: list[AuthorMistake]) -> TriedRules:
+    clues = tuple(clues_for(case, rules, mistakes))
+    applied = [rule for rule, _ in clues]
+    silent = tuple(rule for rule in rules if rule.file and is_asked(rule, case) and rule not in applied)
+    return TriedRules(f"{exercise.id}/{case.criterion.id}", case.verdict, clues, silent)
 
 
 def _notes(

@@ -64,7 +64,7 @@ def summarise(
         records=trace.records(),
         lines=trace.lines(),
         faults=faults,
-        notes=placed_in(notes, sources),
+        notes=tuple(dict.fromkeys(placed_in(notes, sources))),
         starts=trace.starts,
         hints=tuple(_hint(fault, trace, sources) for fault in faults),
         # of those of equal size the last, whose parts have all been matched

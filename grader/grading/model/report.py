@@ -276,6 +276,7 @@ class RuleTrial:
     # Name, priority, place and hint of each rule that applies, in their order: reports show the first. A place is
     # written `file:line`, and is empty if the rule does not name one
     rules: tuple[tuple[str, int, str, str], ...]
+    silent: tuple[str, ...]  # the rubric's own rules that were asked and return nothing
 
 
 @dataclass(frozen=True, slots=True)

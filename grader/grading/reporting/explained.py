@@ -70,7 +70,13 @@ def render_trials(found: Sequence[RuleTrial], *, width: int) -> str:
         for name, priority, place, hint in trial.rules:
             where = f"{shown(place)}: " if place else ""
             lines += _wrapped(f"{priority:>6}  {shown(name)}: ", f"{where}{shown(hint, limit=2000)}", width, after=10)
-        lines += [""] if trial.rules else ["        no rule applies", ""]
+        lines += [] if trial.rules else ["        no rule applies"]
+        if trial.silent:
+            silent = ", ".join(map(shown, trial.silent))
+            lines += _wrapped(
+                "        ", f"of the rubric's own rules, asked and without a result: {silent}", width, after=10
+            )
+        lines.append("")
     return "\n".join(lines) if found else "No criterion lost points, so no rule is tried.\n"
 
 

@@ -12,7 +12,7 @@ from grader.grading.reporting.escape import json_value, shown
 from grader.grading.reporting.graph import draw_graph
 from grader.grading.reporting.json_report import start_values
 from grader.runtime.model.quantities import counted, seconds
-from grader.runtime.model.trace import Endpoint, Fault, LogRecord, Offer, OutputLine
+from grader.runtime.model.trace import ClockKind, Endpoint, Fault, LogRecord, Offer, OutputLine
 
 SCHEMA = "grader/observation/v1"
 #: Lines of one kind that the text shows; the rest are counted.
@@ -33,7 +33,9 @@ def render_summary(summary: Summary) -> str:
 def _lines(summary: Summary) -> Iterator[str]:
     yield f"{', '.join(map(shown, summary.processes))}: {summary.duration_s:.1f} s on the {summary.clock.value} clock"
     if summary.clock_reason:
-        yield f"  note: recorded on the {summary.clock.value} clock: {shown(summary.clock_reason)}"
+        virtual = summary.clock is ClockKind.VIRTUAL
+        about = "virtual time does not suit what was observed" if virtual else "recorded on the wall clock"
+        yield f"  note: {about}: {shown(summary.clock_reason)}"
     yield from (f"  note: {shown(note)}" for note in summary.notes)
     yield from _section("Nodes", map(shown, summary.nodes))
     yield from _section("Topics", (line for topic in summary.topics for line in _topic(topic)))

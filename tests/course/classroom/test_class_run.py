@@ -349,12 +349,13 @@ def test_a_decision_by_a_number_of_two_people_is_asked_for(tmp_path: Path) -> No
 
 
 def test_results_of_another_class_are_not_replaced_in_silence(tmp_path: Path) -> None:
-    """A warning names where they came from, once."""
+    """A warning names where they came from, once, also where a folder was given twice."""
     for place, name in (("one", "ada"), ("two", "bob")):
         hand_in(tmp_path / place, **{name: 5})
     said: list[str] = []
     for source in ("one", "one", "two", "two"):
         wanted = course(tmp_path / source, tmp_path / "out")
+        wanted = replace(wanted, sources=(*wanted.sources, *wanted.sources))
         class_run.grade_class(wanted, Watcher(lambda line: None), said.append, FakeScheduler())
     assert said == [
         f"{tmp_path}/out holds 1 result of another class, of {tmp_path}/one: they stay, but gradebook and page show "

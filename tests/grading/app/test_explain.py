@@ -212,6 +212,38 @@ class Velocity(Node):
     assert [row["criterion"] for row in told] == [t.criterion for t in trials]
 
 
+OWN_HINTS = """from grader.api import hint_rule
+
+
+@hint_rule("topic_rate")
+def finds_nothing(case):
+    return None
+
+
+@hint_rule("topic_rate", fault=True)
+def not_asked(case):
+    return None
+
+
+@hint_rule("field_in_range")
+def of_another_check(case):
+    return None
+"""
+
+
+def test_an_authors_rule_that_finds_nothing_is_named(tmp_path: Path) -> None:
+    """Else nobody sees whether it was asked: an error in it looks like a condition that does not hold."""
+    (tmp_path / "hints.py").write_text(OWN_HINTS)
+    rubric = tmp_path / "rubric.yaml"
+    text = (ROOT / "rubrics" / "exercise_1" / "rubric.yaml").read_text()
+    rubric.write_text(text.replace("criteria:", "hints: [hints.py]\ncriteria:"))
+    kept_run(tmp_path / "kept", velocity_run(velocity_trace(rate_hz=10), source="import rclpy\n"))
+    trials = {one.criterion: one.silent for one in try_rules(tmp_path / "kept", (rubric,))}
+    assert trials["velocity_publisher/rate"] == ("finds_nothing",)
+    shown = grade("--rules", "--rubric", str(rubric), "--on", str(tmp_path / "kept")).output
+    assert "of the rubric's own rules, asked and without a result: finds_nothing\n" in shown
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

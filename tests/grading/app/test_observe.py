@@ -313,7 +313,7 @@ def an_interface_package(folder: Path) -> None:
     (folder / "msg").mkdir(parents=True)
     (folder / "msg" / "Say.msg").write_text("string text\n")
     (folder / "package.xml").write_text(
-        "<package><name>talk_interfaces</name><member_of_group>rosidl_interface_packages</member_of_group></package>"
+        f"<package><name>{folder.name}</name><member_of_group>rosidl_interface_packages</member_of_group></package>"
     )
     (folder / "CMakeLists.txt").write_text('rosidl_generate_interfaces(${PROJECT_NAME} "msg/Say.msg")\n')
 
@@ -342,14 +342,16 @@ def test_a_message_package_is_found_wherever_it_lies(tmp_path: Path, package: st
 
 
 @pytest.mark.ros
-def test_a_package_that_colcon_ignores_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("named", "ignored"), [("src/talk_py/talker", "talk_interfaces"), ("", "src/talk_interfaces")])
+def test_a_package_that_colcon_ignores_is_named(tmp_path: Path, named: str, ignored: str) -> None:
     """With the file that is the reason, and no package of another name."""
     a_package(tmp_path / "src", "talk_py", talker=SAYS)
-    an_interface_package(tmp_path / "src" / "talk_interfaces")
-    (tmp_path / "src" / "talk_interfaces" / "COLCON_IGNORE").touch()
-    summary = observe(ObserveRequest((tmp_path / "src" / "talk_py" / "talker",), NS_PER_S, clock="virtual"), quiet)
-    said = "the package talk_interfaces was left out, as colcon does: there is a file talk_interfaces/COLCON_IGNORE"
-    assert said in summary.notes
+    for name in ("talk_interfaces", "unused_interfaces"):
+        an_interface_package(tmp_path / "src" / name)
+        (tmp_path / "src" / name / "COLCON_IGNORE").touch()
+    summary = observe(ObserveRequest((tmp_path / named,), NS_PER_S, clock="virtual"), quiet)
+    said = f"the package talk_interfaces was left out, as colcon does: there is a file {ignored}/COLCON_IGNORE"
+    assert [note for note in summary.notes if "COLCON_IGNORE" in note] == [said]
     assert not any("rcl_interfaces" in hint for hint in summary.hints)
 
 
@@ -412,7 +414,7 @@ class Recorder:
     def record(self, jobs: Mapping[str, Job], clock: str, progress: object) -> dict[str, Trace]:
         """Return a trace for each job."""
         self.clocks.append(clock)
-        return {key: replace(a_trace(), harness_problem=self.problem) for key in jobs}
+        return {key: replace(a_trace(), harness_problem=self.problem, clock_reason="it works") for key in jobs}
 
 
 @pytest.mark.parametrize("problem", ["", "no worker can be started"])
@@ -425,6 +427,19 @@ def test_where_the_machine_is_too_busy_for_the_wall_clock_virtual_time_is_shown(
     assert session.clocks == ["virtual"]
     assert found == held_up if problem else found.clock is ClockKind.VIRTUAL
     assert problem or found.notes == (f"{observing._TOO_BUSY} clock: a.py: it works",)
+    assert problem or not found.clock_reason  # it is in the note
+
+
+def test_a_reason_for_another_clock_is_not_told_as_the_reason_for_virtual_time() -> None:
+    """Where virtual time was asked for, the text says what it does not suit."""
+    told = []
+    for clock in ClockKind:
+        trace = replace(a_trace(), clock=clock, clock_reason="a.py: it waits")
+        told.append(render_summary(summarise(trace, ["a.py"], "none")).splitlines()[1])
+    assert told == [
+        "  note: virtual time does not suit what was observed: a.py: it waits",
+        "  note: recorded on the wall clock: a.py: it waits",
+    ]
 
 
 ACTION = """class Count(Node):
@@ -443,6 +458,12 @@ AttributeError: 'function' object has no attribute 'info'"""
 def in_action(text: str, at_s: int = 1) -> LogRecord:
     """What rclpy logs of an action of count.py."""
     return LogRecord(at_s * NS_PER_S, "count.py", "ERROR", "count.action_server", text)
+
+
+def test_a_note_is_told_once() -> None:
+    """A launch file leaves out the same in one place several times, as in a loop."""
+    trace = replace(a_trace(), notes=("left out", "held up", "left out"))
+    assert summarise(trace, ["a.py"], "none").notes == ("left out", "held up")
 
 
 def test_an_exception_in_an_action_is_told_with_what_to_do() -> None:

@@ -208,13 +208,17 @@ class Rule:
 
     def clue(self, case: Case) -> Clue | None:
         """Return the rule's clue for a case; None if it does not apply."""
-        applies = (
-            self.explains(case.criterion)
-            and self.fault in (None, case.fault is not None)
-            and self.outcome in (None, case.verdict.outcome)
-            and (self.problem is None or case.is_about(self.problem))
-        )
-        return self.find(case) if applies else None
+        return self.find(case) if is_asked(self, case) else None
+
+
+def is_asked(rule: Rule, case: Case) -> bool:
+    """Return whether a rule is asked about a case."""
+    return (
+        rule.explains(case.criterion)
+        and rule.fault in (None, case.fault is not None)
+        and rule.outcome in (None, case.verdict.outcome)
+        and (rule.problem is None or case.is_about(rule.problem))
+    )
 
 
 Maker = Callable[[Callable[[Given], Clue | None]], Rule]
