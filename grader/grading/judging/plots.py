@@ -275,7 +275,7 @@ def value_panels(plot: Plot, timed: Sequence[_Timed], head: str, prefix: str = "
         said.append(words)
     said += [_constants_said(fields, chosen)] if fields.constants else []
     said += [f"expected: {quote(rules_text(plot.rules), 300)}"] if plot.rules else []
-    said += [band.label for band in plot.bands]
+    said += [_band_said(band) for band in plot.bands]
     said += [f"not drawn: {listed([_label(p) for p in hidden])}"] if hidden else []
     words = f"{head}{': ' if any(said) else ''}{'; '.join(filter(None, said))}."
     if panels:
@@ -375,6 +375,13 @@ def _lines(plot: Plot, readings: Mapping[str, Sequence[Reading]], *, steps: bool
         points = points_of(found[k] for k in kept)
         lines.append(series(_name(plot, path), points, look=look, tone=_tone(place), most=len(points)))
     return lines
+
+
+def _band_said(band: Band) -> str:
+    """Return the label of a band, with its limits if it has no number: what an author writes may be a name alone."""
+    if any(map(str.isdigit, band.label)):
+        return band.label
+    return f"{band.label}: {number(band.low)} to {number(band.high)}"
 
 
 def _panel(  # noqa: PLR0913

@@ -17,7 +17,7 @@ from grader.grading.judging.figures import figures_of
 from grader.grading.judging.findings import met
 from grader.grading.judging.plots import Plot, chart_of, value_panels
 from grader.grading.judging.values import FieldRule
-from grader.grading.model.chart import Chart, Look, Panel, Playback, Tone
+from grader.grading.model.chart import Band, Chart, Look, Panel, Playback, Tone
 from grader.grading.model.exercise import Check, Criterion, Exercise, Finding
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.trace import Trace
@@ -128,6 +128,13 @@ def test_rules_are_levels_and_bands() -> None:
     (made_,) = [p for p, _ in value_panels(Plot("/x", rules=rules), [(0, {"a": 1, "b": 1, "c": 2, "d": 3})], "One")]
     assert [(v.value, v.label) for v in made_.levels] == [(1, "a, b = 1"), (2, "at least 2")]
     assert [(b.low, b.high) for b in made_.bands] == [(0, 5)]
+
+
+def test_a_band_without_a_number_in_its_label_is_told_with_its_limits() -> None:
+    """An author's label may be a name alone; those of the built-in checks hold their numbers."""
+    bands = (Band(0.47, 0.53, "full points"), Band(0.4, 0.6, "0.5 ± 0.1: accepted"))
+    ((_, said),) = value_panels(Plot("/x", bands=bands), [(0, {"a": 0.5}), (1, {"a": 0.6})], "Two messages")
+    assert "full points: 0.47 to 0.53; 0.5 ± 0.1: accepted" in said
 
 
 def test_what_came_stands_above_what_was_published_with_the_cases_marked() -> None:
