@@ -70,6 +70,8 @@ _TEXTS = (
     *("RCUTILS_", "FASTRTPS", "FASTDDS", "PYTHONHASHSEED", "LD_PRELOAD", "_ROS_WHEELS", "GRADER_"),
     *("_rclpy", "__class__", "__code__", "__wrapped__", "__globals__"),
 )
+#: The first folder of such a path where a program joins its parts: `Path("/", "proc", "self")`.
+_FOLDERS = ("proc", "shm")
 #: Functions that read the time, by the clock they use: a program with two may compare them.
 _CLOCKS = {
     "time.time": "system",
@@ -143,6 +145,7 @@ def _named(source: Source) -> Iterator[str]:
         elif isinstance(node, ast.Constant) and isinstance(node.value, (str, bytes)):
             value = node.value if isinstance(node.value, str) else node.value.decode("latin-1")
             yield from (part for part in _TEXTS if part in value)
+            yield from (f"/{part}" for part in _FOLDERS if value.strip("/").partition("/")[0] == part)
         elif isinstance(node, ast.keyword) and node.arg in ("stack_info", "stacklevel"):
             yield node.arg
         elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
