@@ -16,9 +16,11 @@ from grader.grading.judging.diagnosis.wiring import (
     made,
     made_for,
     number_in_code,
+    own_uniform,
     roots,
     runs,
     target_of,
+    uniform_call,
     variable_of,
 )
 from grader.grading.judging.facts import DrawFacts, SeriesFacts
@@ -601,7 +603,7 @@ def _draw_limits(case: Case) -> Clue | None:
     if facts is None or not (facts.outside or facts.narrow) or len(calls) != 1:
         return None
     call, low, high = calls[0], number(check.low), number(check.high)
-    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    right = uniform_call(source, str(float(check.low)), str(float(check.high)), call)
     if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
         hint = f"{source.code(call)} has no limits, so some values lie far outside: use {right}"
         return Clue(hint, source.place(call), key="draw")
@@ -627,9 +629,10 @@ def _scaled_draw(source: Source, check: Any, call: ast.Call, facts: DrawFacts) -
         return None
     if check.low <= min(known) and max(known) <= check.high and not facts.narrow:
         return None
+    low, high = float(check.low), float(check.high)
+    right = own_uniform(source, str(low), str(high), call) or f"{low} + {source.code(call, 40)} * {high - low}"
     hint = f"{source.code(whole)} goes from {number(min(known))} to {number(max(known))}"
-    right = f"random.uniform({float(check.low)}, {float(check.high)})"
-    return Clue(f"{hint}: {right}", source.place(whole), key="draw")
+    return Clue(f"{hint}: write {right}", source.place(whole), key="draw")
 
 
 def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: int = 0) -> float | None:
@@ -734,5 +737,5 @@ def _not_drawn(case: Case) -> Clue | None:
     if len(places) != 1:
         return None
     code = source.code(places[0])
-    hint = f"{code} is not random: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
-    return Clue(hint, source.place(places[0]))
+    right = uniform_call(source, str(float(check.low)), str(float(check.high)))
+    return Clue(f"{code} is not random: for a new value each time, write {right}", source.place(places[0]))

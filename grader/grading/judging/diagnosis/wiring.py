@@ -195,6 +195,33 @@ def given_leaf(source: Source, leaf: str) -> list[ast.AST]:
     return found + [k for k in keywords if k.arg == leaf]
 
 
+#: What makes an object with a method `uniform` of its own.
+_GENERATORS = ("random.Random", "random.SystemRandom", "numpy.random.default_rng", "numpy.random.RandomState")
+
+
+def own_uniform(source: Source, low: str, high: str, like: ast.Call | None = None) -> str:
+    """Return the call of `uniform` by what the file imports and calls in another draw; empty if it imports neither."""
+    owner = like.func.value if like is not None and isinstance(like.func, ast.Attribute) else None
+    made_by = value_of(source, owner)
+    generator = isinstance(made_by, ast.Call) and source.resolved(made_by.func) in _GENERATORS
+    if owner is not None and (generator or source.resolved(owner) in ("random", "numpy.random")):
+        return f"{chain(owner)}.uniform({low}, {high})"
+    meant = ("random.uniform", "numpy.random.uniform")
+    function = next((name for name, dotted in source.aliases.items() if dotted in meant), "")
+    module = next((name for name, dotted in source.aliases.items() if dotted == "random"), "")
+    if function or "random" in source.stars:
+        return f"{function or 'uniform'}({low}, {high})"
+    return f"{module}.uniform({low}, {high})" if module else ""
+
+
+def uniform_call(source: Source, low: str, high: str, like: ast.Call | None = None) -> str:
+    """Return the call of `uniform` that a file can make, followed by the import that it lacks."""
+    own = own_uniform(source, low, high, like)
+    if own or not any(dotted.startswith("random.") for dotted in source.aliases.values()):
+        return own or f"random.uniform({low}, {high})"
+    return f"uniform({low}, {high}), and import it with from random import uniform"
+
+
 #: Maximum number of publishers, subscriptions or timers examined, of each kind.
 MOST_MADE = 20
 
