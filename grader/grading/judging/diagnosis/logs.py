@@ -548,6 +548,17 @@ def _logged_between(source: Source, test: ast.If, by: ast.BinOp) -> Clue | None:
     return Clue(f"'{source.code(asked, 40)}' is false when {code} is 0: write {code} == 0", source.place(test))
 
 
+def _logged_by_quotient(source: Source, test: ast.If, divisions: list[ast.BinOp], every: int) -> Clue | None:
+    """Return a clue if a condition compares a quotient in place of the rest: `count // 10 == 0`."""
+    by = [n for n in divisions if isinstance(n.op, (ast.FloorDiv, ast.Div)) and not number_in_code(source, n)]
+    worth = number_in_code(source, by[0].right) if len(by) == 1 else None
+    if worth is None or worth <= 0:
+        return None
+    first = f"the first {number(worth)} messages" if isinstance(by[0].op, ast.FloorDiv) else "the first message only"
+    hint = f"'{source.code(test.test, 40)}' holds for {first}: write {source.code(by[0].left, 30)} % {every} == 0"
+    return Clue(hint, source.place(test))
+
+
 def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:
     """Return a clue if a condition compares the counter itself, as in `count == 10`."""
     asked = test.test
@@ -555,12 +566,17 @@ def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | No
         not isinstance(asked, ast.Compare)
         or len(asked.ops) != 1
         or not isinstance(asked.left, (ast.Name, ast.Attribute))
+        or not _is_counter(source, asked.left)
     ):
-        return None
-    if number_in_code(source, asked.comparators[0]) is None:
         return None
     hint = f"'{source.code(asked, 40)}' does not hold for every {every}th message: write "
     return Clue(f"{hint}{source.code(asked.left, 30)} % {every} == 0", source.place(test))
+
+
+def _is_counter(source: Source, name: ast.Name | ast.Attribute) -> bool:
+    """Return whether 1 is added to a variable."""
+    statements = [source.parents.get(n) for n in source.stored.get(chain(name), ())]
+    return any(isinstance(s, ast.AugAssign) and number_in_code(source, s.value) == 1 for s in statements)
 
 
 def _inner(node: ast.AST) -> list[ast.AST]:
@@ -612,13 +628,13 @@ def _log_every(case: Case) -> Clue | None:
     test = next(source.around(call, ast.If), None) if call is not None else None
     if call is not None and call in timed and test is None:
         return Clue(f"this logs every message: put it under if count % {every} == 0", source.place(call))
-    if test is not None and (clue := _logged_at_one_number(source, test, every)) is not None:
-        return clue
-    divisions = [n for n in ast.walk(test.test) if isinstance(n, ast.BinOp)] if test is not None else []
+    if test is None:
+        return None
+    divisions = [n for n in ast.walk(test.test) if isinstance(n, ast.BinOp)]
     by = [n for n in divisions if isinstance(n.op, ast.Mod)]
     worth = constant(source, by[0].right) if len(by) == 1 else None
-    if worth is None or test is None:
-        return None
+    if worth is None:
+        return _logged_by_quotient(source, test, divisions, every) or _logged_at_one_number(source, test, every)
     rest = number_in_code(source, test.test.comparators[0]) if isinstance(test.test, ast.Compare) else None
     if rest is not None and rest >= worth.value:
         hint = f"'{source.code(test.test, 40)}' is never true, as it is below {number(worth.value)}: compare with 0"
