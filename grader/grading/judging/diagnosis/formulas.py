@@ -12,11 +12,13 @@ from grader.grading.judging.diagnosis.wiring import (
     callback_nodes,
     constant,
     given_leaf,
+    is_read,
     made,
     names_called,
     names_in,
     number_in_code,
     runs,
+    set_at_first_only,
     sole_assignment,
 )
 from grader.grading.judging.facts import SeriesFacts
@@ -184,7 +186,7 @@ def _counts_by_another_step(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule("field_function", "service_sequence", priority=10138)
+@hint_rule("field_function", "service_sequence", "log_period", priority=10138)
 def _result_thrown_away(case: Case) -> Clue | None:
     """`self.count + 1` as a statement, for `+=`, or `self.count == 0`, for `=`."""
     for source in case.sources.values():
@@ -213,8 +215,7 @@ def _changed_in_a_copy(case: Case) -> Clue | None:
             kept = chain(value.left) if isinstance(value, ast.BinOp) else ""
             if counters is not None and kept not in counters:
                 continue
-            read = any(isinstance(n.ctx, ast.Load) and chain(n) == target for n in source.names())
-            if read:
+            if is_read(source, target):
                 hint = f"{kept} never changes: add {kept} = {target} below this line"
             else:
                 local = f"local to {source.function_name(statement)}" if "." not in target else "not read"
@@ -231,18 +232,7 @@ def _changed_copy(source: Source, node: ast.AST) -> ast.Assign | None:
     kept, target = chain(value.left), chain(node.targets[0])
     alone = kept.startswith("self.") and kept.count(".") == 1 and bool(target) and target != kept
     counted = number_in_code(source, value.right) is not None
-    return node if alone and counted and _set_at_first_only(source, kept) else None
-
-
-def _set_at_first_only(source: Source, counter: str) -> bool:
-    """Return whether an attribute is set in the constructor alone, or a variable to a number outside of any loop."""
-    stores = source.stored.get(counter, ())
-    if "." in counter:
-        return all(source.function_name(s) == "__init__" for s in stores)
-    values = [getattr(source.parents.get(s), "value", None) for s in stores]
-    plain = all(isinstance(source.parents.get(s), ast.Assign) for s in stores)
-    looped = any(any(source.around(s, kind)) for s in stores for kind in (ast.While, ast.For))
-    return plain and not looped and all(isinstance(value, ast.Constant) for value in values)
+    return node if alone and counted and set_at_first_only(source, kept) else None
 
 
 @hint_rule("field_function", priority=10140)
@@ -252,7 +242,7 @@ def _counter_never_changes(case: Case) -> Clue | None:
     if len(values) < 2 or len(set(map(repr, values))) > 1:
         return None
     for counter in _counters(case):
-        if _set_at_first_only(case.source, counter):
+        if set_at_first_only(case.source, counter):
             sends = list(case.source.calls("publish"))
             place = case.source.place(sends[0]) if len(sends) == 1 else None
             return Clue(f"{counter} never changes: write {counter} += 1 after each message", place)

@@ -10,9 +10,11 @@ from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_ca
 from grader.grading.judging.diagnosis.wiring import (
     Made,
     callback_nodes,
+    conditions,
     constant,
     is_flag,
     is_log,
+    is_read,
     made,
     made_for,
     message_of,
@@ -23,14 +25,16 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     runs,
+    set_at_first_only,
     switches,
     target_of,
+    time_since,
     timer_code,
     value_of,
 )
 from grader.grading.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import printed_lines, student_records
-from grader.grading.judging.source import Source, argument, chain, last_name, text_of
+from grader.grading.judging.source import Source, argument, chain, last_name, subtree, text_of
 from grader.grading.model.exercise import Location, Outcome, ProblemKind
 from grader.grading.model.wording import number
 
@@ -363,6 +367,31 @@ def _unit_of_pair(source: Source, node: ast.BinOp, depth: int) -> float | None:
     if left is None or not by or not isinstance(node.op, (ast.Mult, ast.Div, ast.FloorDiv)):
         return None
     return left / by if isinstance(node.op, ast.Mult) else left * by
+
+
+@hint_rule(priority=11097)
+def _time_stands_still(case: Case) -> Clue | None:
+    """The time of the last log is never stored anew, or in another variable, so that each message is logged."""
+    pace, call, source = case.found(LogPaceFacts), log_call(case), case.source
+    if call is None or pace is None or not 0 < pace.average_s < pace.wanted_s:
+        return None
+    for test in conditions(source, call):
+        passed = time_since(source, test.test)
+        last = chain(passed.right) if passed is not None else ""
+        if passed is None or not source.stores(last) or not set_at_first_only(source, last):
+            continue
+        now = source.code(passed.left, 40)
+        for statement in (s for s in source.all(ast.Assign) if source.function_of(s) is source.function_of(call)):
+            target = chain(statement.targets[0])
+            if source.code(statement.value, 40) == now and target and not is_read(source, target):
+                local = f"local to {source.function_name(statement)}" if "." not in target else "not read"
+                hint = f"{target} is {local}, so {last} never changes: write {last} = {now}"
+                return Clue(hint, source.place(statement), key="log_pace")
+        around = call in set(subtree(test))
+        stays, where = ("true", "under it") if around else ("false", "below it")
+        hint = f"{last} never changes, so '{source.code(test.test, 40)}' stays {stays}: add {last} = {now} {where}"
+        return Clue(hint, source.place(test), key="log_pace")
+    return None
 
 
 @hint_rule(priority=11100)

@@ -36,6 +36,7 @@ from grader.grading.judging.diagnosis.wiring import (
     short,
     spins,
     target_of,
+    time_since,
     timer_code,
     used,
     value_of,
@@ -619,6 +620,22 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
         if not _heard(unseen.case, item.topic) and not any(c in timed for c in calls):
             hint = f"this runs only when a message arrives on {quote(item.topic, 60)}, and none does: use a timer"
             return Clue(hint, source.place(item.call), key=f"told:{item.call.lineno}")
+    return None
+
+
+@hint_rule(given=_unseen, priority=8252)
+def _time_moves_always(unseen: _Unseen) -> Clue | None:
+    """The time of the last log is stored with each message, so that it is never long ago."""
+    source, calls = unseen.source, unseen.calls
+    for test in (t for call in calls for t in source.around(call, ast.If)):
+        passed = time_since(source, test.test)
+        stores = source.stores(chain(passed.right)) if passed is not None else []
+        for statement in (source.parents.get(n) for n in stores):
+            beside = statement is not None and source.parents.get(statement) is source.parents.get(test)
+            if statement is not None and beside:
+                asked = source.code(test.test, 40)
+                hint = f"{source.code(statement)} runs for each message, so '{asked}' is never true: "
+                return Clue(f"{hint}indent it under the if", source.place(statement))
     return None
 
 

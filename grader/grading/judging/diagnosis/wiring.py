@@ -644,6 +644,32 @@ def returns_nothing(source: Source, call: ast.Call) -> bool:
     return last_name(call.func) in (*_NOTHING, *LOG_METHODS) and isinstance(call.func, ast.Attribute)
 
 
+def set_at_first_only(source: Source, counter: str) -> bool:
+    """Return whether an attribute is set in the constructor alone, or a variable to a number outside of any loop."""
+    stores = source.stored.get(counter, ())
+    if "." in counter:
+        return all(source.function_name(s) == "__init__" for s in stores)
+    values = [getattr(source.parents.get(s), "value", None) for s in stores]
+    plain = all(isinstance(source.parents.get(s), ast.Assign) for s in stores)
+    looped = any(any(source.around(s, kind)) for s in stores for kind in (ast.While, ast.For))
+    return plain and not looped and all(isinstance(value, ast.Constant) for value in values)
+
+
+def is_read(source: Source, dotted: str) -> bool:
+    """Return whether the value of a name or an attribute is used anywhere in the file."""
+    return any(isinstance(n.ctx, ast.Load) and chain(n) == dotted for n in source.names())
+
+
+def time_since(source: Source, test: ast.expr) -> ast.BinOp | None:
+    """Return `now - self.last` of a condition, also through a local variable; None if it compares no such time."""
+    local = [v for n in ast.walk(test) if isinstance(n, ast.Name) and (v := sole_assignment(source, n)) is not None]
+    for node in (n for tree in (test, *local) for n in ast.walk(tree)):
+        last = chain(node.right) if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub) else ""
+        if isinstance(node, ast.BinOp) and last.startswith("self.") and last.count(".") == 1:
+            return node
+    return None
+
+
 def spin_timeout(call: ast.Call) -> ast.expr | None:
     """Return the timeout of spin_once: a function of rclpy that takes the node first, or a method of an executor."""
     return argument(call, 2 if chain(call.func) in ("rclpy.spin_once", "spin_once") else 0, "timeout_sec")
