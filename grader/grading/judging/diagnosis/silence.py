@@ -33,6 +33,7 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     runs,
+    shared_names,
     short,
     spins,
     target_of,
@@ -314,8 +315,38 @@ def _never_publishes(case: Case) -> Clue | None:
     item = made_for(source, "publisher", topic) if topic else None
     if item is None or any(last_name(n) == "publish" for n in source.names()) or unheard_topic(case):
         return None
-    hint = f"{source.code(item.call)} creates a publisher, but nothing in the file calls its publish()"
-    return Clue(hint, source.place(item.call))
+    return _message_not_sent(source, item) or Clue(
+        f"{source.code(item.call)} creates a publisher, but nothing in the file calls its publish()",
+        source.place(item.call),
+    )
+
+
+def _message_not_sent(source: Source, publisher: Made) -> Clue | None:
+    """Return the last line that sets a message of a publisher's type, where there is only one."""
+    makers = [c for c in source.calls(publisher.type) if target_of(source, c)] if publisher.type else []
+    owner = target_of(source, publisher.call)
+    function = source.function_of(makers[0]) if len(makers) == 1 else None
+    if function is None or not owner or function.name == "__init__":
+        return None
+    around = (function, *source.around(function, ast.FunctionDef), None)
+    seen = source.is_method(function) if "." in owner else source.function_of(publisher.call) in around
+    if not seen:
+        return None
+    name = target_of(source, makers[0])
+    send = f"{owner}.publish({name})"
+    given = next(
+        (r for r in source.all(ast.Return) if source.function_of(r) is function and chain(r.value) == name), None
+    )
+    if given is not None:
+        hint = f"{source.code(given)} publishes nothing, as nobody receives it: write {send}"
+        return Clue(hint, source.place(given))
+    made_at = source.parents[makers[0]]
+    inside = [n for n in subtree(function) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+    sets = [n for n in inside if chain(n).startswith(f"{name}.") and first_line(n) > first_line(made_at)]
+    last = max([made_at, *sets], key=first_line)
+    level = next((t for t in reversed([*source.around(last, ast.If)]) if made_at not in set(subtree(t))), None)
+    where = "below this line" if level is None else f"after the block of 'if {source.code(level.test, 30)}'"
+    return Clue(f"{name} is never published: add {send} {where}", source.place(last))
 
 
 @hint_rule(given=_unseen, priority=8100)
@@ -418,7 +449,8 @@ def _kept_elsewhere(source: Source, waited: str) -> Clue | None:
         if not mine or declared or not any(source.function_of(n) is None for n in stores):
             return None
         hint = f"{name} assigns {waited}, so Python treats it as local"
-        return Clue(f"{hint}: begin {name} with: global {waited}", source.place(mine[0]))
+        names = shared_names(source, function, waited) if isinstance(function, Function) else waited
+        return Clue(f"{hint}: begin {name} with: global {names}", source.place(mine[0]))
     if not stores or not all(early):
         return None
     chosen = [n for n in locals_ if n.id == bare] or locals_

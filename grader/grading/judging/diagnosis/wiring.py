@@ -655,6 +655,20 @@ def set_at_first_only(source: Source, counter: str) -> bool:
     return plain and not looped and all(isinstance(value, ast.Constant) for value in values)
 
 
+def shared_names(source: Source, function: Function, first: str) -> str:
+    """Return the variables of the file that a function assigns as its own and others read, one of them first."""
+    outside = {n for n, places in source.stored.items() if any(_of_the_file(source, place) for place in places)}
+    inside = set(subtree(function))
+    mine = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    elsewhere = {n.id for n in source.all(ast.Name) if isinstance(n.ctx, ast.Load) and n not in inside}
+    declared = {name for n in inside if isinstance(n, ast.Global) for name in n.names}
+    return ", ".join([first, *sorted((mine & outside & elsewhere) - declared - {first})])
+
+
+def _of_the_file(source: Source, place: ast.AST) -> bool:
+    return source.function_of(place) is None and source.class_of(place) is None
+
+
 def is_read(source: Source, dotted: str) -> bool:
     """Return whether the value of a name or an attribute is used anywhere in the file."""
     return any(isinstance(n.ctx, ast.Load) and chain(n) == dotted for n in source.names())
