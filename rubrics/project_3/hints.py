@@ -208,9 +208,16 @@ def _other_count(case: Case) -> Clue | None:
     for loop in source.all(ast.For):
         times = _turns(source, loop)
         if times is not None and times == asked and _asks(source, loop):
-            code = source.code(loop.iter, 40)
-            return Clue(f"{code} gives {times} questions: write range({wanted})", source.place(loop))
+            hint = f"{source.code(loop.iter, 40)} gives {times} questions: write {_range(source, loop, wanted)}"
+            return Clue(hint, source.place(loop))
     return None
+
+
+def _range(source: Source, loop: ast.For, times: int) -> str:
+    """Return a range from the same number on that turns so many times."""
+    given = loop.iter.args if isinstance(loop.iter, ast.Call) else []
+    first = number_in_code(source, given[0]) if len(given) == 2 else None
+    return f"range({times})" if first is None else f"range({number(first)}, {number(first + times)})"
 
 
 def _turns(source: Source, loop: ast.For) -> int | None:

@@ -299,14 +299,16 @@ def _used_later(source: Source, statement: ast.AST, counter: str) -> bool:
     return bool(lines) and min(lines) > first_line(statement)
 
 
-def _counters(case: Case) -> Iterator[str]:
-    """Yield what a field's value may count by: attributes of the node, and variables that count."""
-    source = case.source
+def _counters(case: Case) -> list[str]:
+    """Return what a field's value may count by: attributes of the node, and variables that count."""
+    source, found, zero = case.source, [], []
     for place in given_leaf(source, case.check.field.rpartition(".")[2]):
         for value in _computed(source, place):
-            yield from _attributes(value)
+            found += list(_attributes(value))
             names = [n.id for n in ast.walk(value) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
-            yield from (name for name in names if _counts(source, name, source.function_of(place)))
+            found += [name for name in names if _counts(source, name, source.function_of(place))]
+            zero += [name for name in names if _is_zero(source, name, source.function_of(place))]
+    return found or zero
 
 
 def _computed(source: Source, place: ast.AST) -> list[ast.expr]:
@@ -320,15 +322,23 @@ def _computed(source: Source, place: ast.AST) -> list[ast.expr]:
 
 
 def _counts(source: Source, name: str, function: Function | None) -> bool:
-    """Return whether a variable of a function, or of the file, grows, runs through a range, or is 0 only."""
-    stores = [n for n in source.stored.get(name, ()) if source.function_of(n) in (function, None)]
-    statements = [source.parents.get(n) for n in stores]
-    if any(isinstance(s, (ast.AugAssign, ast.For)) for s in statements):
-        return True
+    """Return whether a variable of a function, or of the file, grows or runs through a range."""
+    statements = _setting(source, name, function)
     values = [s.value for s in statements if isinstance(s, ast.Assign)]
-    zero = [v for v in values if isinstance(v, ast.Constant) and v.value == 0]
     grows = any(isinstance(v, ast.BinOp) and name in names_in(v) for v in values)
-    return grows or len(zero) == len(statements) == 1
+    return grows or any(isinstance(s, (ast.AugAssign, ast.For)) for s in statements)
+
+
+def _is_zero(source: Source, name: str, function: Function | None) -> bool:
+    """Return whether a variable is set once, to 0."""
+    values = [getattr(s, "value", None) for s in _setting(source, name, function)]
+    return len(values) == 1 and isinstance(values[0], ast.Constant) and values[0].value == 0
+
+
+def _setting(source: Source, name: str, function: Function | None) -> list[ast.AST | None]:
+    """Return the statements that set a variable of a function, or of the file."""
+    stores = [n for n in source.stored.get(name, ()) if source.function_of(n) in (function, None)]
+    return [source.parents.get(n) for n in stores]
 
 
 def _attributes(value: ast.expr) -> Iterator[str]:

@@ -12,6 +12,7 @@ from grader.grading.judging.diagnosis.rules import (
     Clue,
     file_for,
     hint_rule,
+    log_call,
     silent_topic,
     unheard_topic,
 )
@@ -24,6 +25,7 @@ from grader.grading.judging.diagnosis.wiring import (
     head_of,
     is_flag,
     is_log,
+    is_read,
     made,
     made_for,
     names_called,
@@ -36,7 +38,9 @@ from grader.grading.judging.diagnosis.wiring import (
     shared_names,
     short,
     spins,
+    switches,
     target_of,
+    text_origin,
     time_since,
     timer_code,
     used,
@@ -44,7 +48,7 @@ from grader.grading.judging.diagnosis.wiring import (
     variable_of,
     waits_for_ever,
 )
-from grader.grading.judging.facts import RateFacts, WrongLogFacts
+from grader.grading.judging.facts import LogPaceFacts, RateFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import student_records
 from grader.grading.judging.source import (
     Function,
@@ -172,8 +176,9 @@ def _wrong_topic(case: Case) -> Clue | None:
 def _elsewhere(source: Source, item: Made, found: str, topic: str) -> Clue:
     does = "publishes on" if item.kind == "publisher" else "subscribes to"
     hint = f"{source.code(item.call)} {does} {quote(found, 60)}: the task asks for {topic}"
-    hint += elsewhere_because(item.topic, topic)
-    return Clue(hint, source.place(item.call), key=f"topic:{source.file}:{item.call.lineno}")
+    because = elsewhere_because(item.topic, topic)
+    origin = item.call if because else text_origin(source, argument(item.call, 1, "topic"), item.call)
+    return Clue(hint + because, source.place(origin), key=f"topic:{source.file}:{item.call.lineno}")
 
 
 @hint_rule("publishes", "subscribes", priority=8040)
@@ -457,7 +462,11 @@ def _kept_elsewhere(source: Source, waited: str) -> Clue | None:
     if chosen:
         kept = min(chosen, key=first_line)
         return Clue(f"{kept.id} is local to {name}: assign to {waited}", source.place(kept))
-    return Clue(f"nothing sets {waited}: assign the message to it in {name}", source.place(function))
+    fields = [n for n in inside if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+    unread = [n for n in fields if chain(n).startswith("self.") and not is_read(source, chain(n))]
+    hint = f"nothing sets {waited}: assign the message to it in {name}"
+    hint = f"{chain(unread[0])} is not read: assign to {waited}" if len(unread) == 1 else hint
+    return Clue(hint, source.place(unread[0] if len(unread) == 1 else function))
 
 
 @hint_rule(given=_unseen, priority=8150)
@@ -655,19 +664,27 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@hint_rule(given=_unseen, priority=8252)
-def _time_moves_always(unseen: _Unseen) -> Clue | None:
+@hint_rule(priority=8252)
+def _time_moves_always(case: Case) -> Clue | None:
     """The time of the last log is stored with each message, so that it is never long ago."""
-    source, calls = unseen.source, unseen.calls
-    for test in (t for call in calls for t in source.around(call, ast.If)):
+    pace, wrong = case.found(LogPaceFacts), case.found(WrongLogFacts)
+    rare = pace is not None and (pace.count <= 2 or pace.average_s > pace.wanted_s)
+    few = wrong is not None and (wrong.right == 0 or wrong.cause == "few")
+    call, source = log_call(case), case.source
+    if call is None or not (rare or few):
+        return None
+    heard = [m for m in made(source, "subscription") if m.topic is not None and _heard(case, m.topic)]
+    inside = {n for m in heard for n in runs(source, m)}
+    waits = {switch.node for switch in switches(source) if switch.limit.value > 0}
+    for test in (t for t in source.around(call, ast.If) if t in inside and waits & set(ast.walk(t.test))):
         passed = time_since(source, test.test)
         stores = source.stores(chain(passed.right)) if passed is not None else []
-        for statement in (source.parents.get(n) for n in stores):
-            beside = statement is not None and source.parents.get(statement) is source.parents.get(test)
-            if statement is not None and beside:
-                asked = source.code(test.test, 40)
-                hint = f"{source.code(statement)} runs for each message, so '{asked}' is never true: "
-                return Clue(f"{hint}indent it under the if", source.place(statement))
+        statements = [s for n in stores if (s := source.parents.get(n)) is not None]
+        beside = [s for s in statements if source.parents.get(s) is source.parents.get(test)]
+        if beside:
+            code, asked = source.code(beside[0]), source.code(test.test, 40)
+            hint = f"{code} runs for each message, so '{asked}' is hardly ever true: indent it under the if"
+            return Clue(hint, source.place(beside[0]), key="log_pace")
     return None
 
 

@@ -276,6 +276,16 @@ def text_in_code(source: Source, node: ast.expr | None, depth: int = 0) -> str |
     return text_in_code(source, values[0], depth + 1) if len(values) == 1 else None
 
 
+def text_origin(source: Source, node: ast.expr | None, otherwise: ast.AST) -> ast.AST:
+    """Return the literal of a text, also of one that has a name; `otherwise` if the text does not show it."""
+    for _ in range(3):
+        if text_of(node) is not None and node is not None:
+            return node
+        value = value_of(source, node)
+        node = value if isinstance(value, ast.expr) else None
+    return otherwise
+
+
 def goes_to(written: str | None, topic: str) -> bool:
     """Return whether a topic as written may be this one on the wire; a namespace may be prepended."""
     if not written:
