@@ -30,6 +30,7 @@ from grader.api import (
     subtree,
     switches,
     text_comparisons,
+    text_of,
 )
 
 
@@ -154,6 +155,46 @@ def _is_number(source: Source, name: ast.Name | ast.Attribute) -> bool:
     return any(isinstance(v, ast.Call) and chain(v.func) in ("float", "int") for v in values)
 
 
+#: Functions that make an integer of a number.
+_ROUNDING = ("int", "round", "floor", "ceil", "trunc")
+#: What of a regular expression reads an integer -> what reads a decimal number as well.
+_DIGITS = {r"\d+": r"[\d.]+", "[0-9]+": "[0-9.]+", r"\d*": r"[\d.]*", r"\d{2}": r"[\d.]+"}
+
+
+@hint_rule("reacts_to_responses", outcome=Outcome.NOT_MET, priority=3144)
+def _fraction_dropped(case: Case) -> Clue | None:
+    """The number is read without its decimals, so that the limit is taken for reached just above it."""
+    warned = [a.warned for a in _after(case, "good")]
+    source, limit = case.source, number(case.check.threshold)
+    if not any(warned) or all(warned):
+        return None
+    nodes: list[ast.expr] = [*source.all(ast.Call), *source.all(ast.Subscript), *source.all(ast.Constant)]
+    found = [(node, better) for node in nodes if (better := _with_decimals(source, node))]
+    if len(found) != 1:
+        return None
+    hint = f"{source.code(found[0][0], 50)} drops the decimals, so {limit}.1 becomes {limit}: write {found[0][1]}"
+    return Clue(hint, source.place(found[0][0]), key="charge")
+
+
+def _with_decimals(source: Source, node: ast.expr) -> str:
+    """Return what reads the decimals too; empty if a node does not drop any."""
+    if isinstance(node, ast.Call) and last_name(node.func) in _ROUNDING and len(node.args) == 1:
+        inner = node.args[0]
+        code = source.code(inner, 40)
+        return code if isinstance(inner, ast.Call) and chain(inner.func) == "float" else f"float({code})"
+    if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Call):
+        call = node.value
+        cut = last_name(call.func) in ("split", "partition") and text_of(argument(call, 0, "sep")) == "."
+        return source.code(call.func.value, 40) if cut and isinstance(call.func, ast.Attribute) else ""
+    pattern = text_of(node)
+    asked = source.parents.get(node)
+    used = isinstance(asked, ast.Call) and source.resolved(asked.func).startswith("re.")
+    digits = next((d for d in _DIGITS if pattern is not None and d in pattern), "")
+    if pattern is None or not used or not digits or r"\." in pattern or "." in pattern.replace(".*", ""):
+        return ""
+    return source.code(node, 60).replace(digits, _DIGITS[digits])
+
+
 # --- the client: how often it asks ------------------------------------------------------------------------------------
 
 
@@ -167,9 +208,16 @@ def _other_count(case: Case) -> Clue | None:
     for loop in source.all(ast.For):
         times = _turns(source, loop)
         if times is not None and times == asked and _asks(source, loop):
-            code = source.code(loop.iter, 40)
-            return Clue(f"{code} gives {times} questions: write range({wanted})", source.place(loop))
+            hint = f"{source.code(loop.iter, 40)} gives {times} questions: write {_range(source, loop, wanted)}"
+            return Clue(hint, source.place(loop))
     return None
+
+
+def _range(source: Source, loop: ast.For, times: int) -> str:
+    """Return a range from the same number on that turns so many times."""
+    given = loop.iter.args if isinstance(loop.iter, ast.Call) else []
+    first = number_in_code(source, given[0]) if len(given) == 2 else None
+    return f"range({times})" if first is None else f"range({number(first)}, {number(first + times)})"
 
 
 def _turns(source: Source, loop: ast.For) -> int | None:

@@ -12,6 +12,7 @@ from grader.grading.judging.diagnosis import (
     attributes,
     callbacks,
     crashes,
+    formulas,
     launch_mistakes,
     loading,
     logs,
@@ -47,6 +48,7 @@ _MODULES = (
     silence,
     rates,
     values,
+    formulas,
     logs,
 )
 #: All rules of the grader in the order of their priorities; the first that applies wins.

@@ -16,10 +16,12 @@ from grader.grading.judging.source import (
     chain,
     covers,
     first_line,
+    last_line,
     last_name,
     parameters,
     text_of,
 )
+from grader.grading.model.exercise import Location
 from grader.runtime.model.trace import Fault, FaultKind
 
 _QUOTES = "\"'"
@@ -176,7 +178,9 @@ def _service_signature(crash: Crash) -> Clue | None:
             return Clue(hint, source.place(function))
         empty = all(r.value is None for r in source.all(ast.Return) if source.function_of(r) is function)
         if empty and crash.said(r"^TypeError$|^TypeError: *$|[Rr]esponse"):
-            return Clue(f"{function.name} must end with: return response", source.place(function))
+            given = [n for n in parameters(function) if n != "self"]
+            hint = f"{function.name} must end with: return {given[1] if len(given) > 1 else 'response'}"
+            return Clue(hint, Location(source.file, last_line(function)))
     return None
 
 

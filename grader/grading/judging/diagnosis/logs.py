@@ -10,9 +10,11 @@ from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, log_ca
 from grader.grading.judging.diagnosis.wiring import (
     Made,
     callback_nodes,
+    conditions,
     constant,
     is_flag,
     is_log,
+    is_read,
     made,
     made_for,
     message_of,
@@ -23,14 +25,16 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     runs,
+    set_at_first_only,
     switches,
     target_of,
+    time_since,
     timer_code,
     value_of,
 )
 from grader.grading.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import printed_lines, student_records
-from grader.grading.judging.source import Source, argument, chain, last_name, text_of
+from grader.grading.judging.source import Source, argument, chain, last_name, subtree, text_of
 from grader.grading.model.exercise import Location, Outcome, ProblemKind
 from grader.grading.model.wording import number
 
@@ -365,6 +369,31 @@ def _unit_of_pair(source: Source, node: ast.BinOp, depth: int) -> float | None:
     return left / by if isinstance(node.op, ast.Mult) else left * by
 
 
+@hint_rule(priority=11097)
+def _time_stands_still(case: Case) -> Clue | None:
+    """The time of the last log is never stored anew, or in another variable, so that each message is logged."""
+    pace, call, source = case.found(LogPaceFacts), log_call(case), case.source
+    if call is None or pace is None or not 0 < pace.average_s < pace.wanted_s:
+        return None
+    for test in conditions(source, call):
+        passed = time_since(source, test.test)
+        last = chain(passed.right) if passed is not None else ""
+        if passed is None or not source.stores(last) or not set_at_first_only(source, last):
+            continue
+        now = source.code(passed.left, 40)
+        for statement in (s for s in source.all(ast.Assign) if source.function_of(s) is source.function_of(call)):
+            target = chain(statement.targets[0])
+            if source.code(statement.value, 40) == now and target and not is_read(source, target):
+                local = f"local to {source.function_name(statement)}" if "." not in target else "not read"
+                hint = f"{target} is {local}, so {last} never changes: write {last} = {now}"
+                return Clue(hint, source.place(statement), key="log_pace")
+        around = call in set(subtree(test))
+        stays, where = ("true", "under it") if around else ("false", "below it")
+        hint = f"{last} never changes, so '{source.code(test.test, 40)}' stays {stays}: add {last} = {now} {where}"
+        return Clue(hint, source.place(test), key="log_pace")
+    return None
+
+
 @hint_rule(priority=11100)
 def _log_period(case: Case) -> Clue | None:
     """The timer, the throttle or the callback sets the wrong pace."""
@@ -548,6 +577,17 @@ def _logged_between(source: Source, test: ast.If, by: ast.BinOp) -> Clue | None:
     return Clue(f"'{source.code(asked, 40)}' is false when {code} is 0: write {code} == 0", source.place(test))
 
 
+def _logged_by_quotient(source: Source, test: ast.If, divisions: list[ast.BinOp], every: int) -> Clue | None:
+    """Return a clue if a condition compares a quotient in place of the rest: `count // 10 == 0`."""
+    by = [n for n in divisions if isinstance(n.op, (ast.FloorDiv, ast.Div)) and not number_in_code(source, n)]
+    worth = number_in_code(source, by[0].right) if len(by) == 1 else None
+    if worth is None or worth <= 0:
+        return None
+    first = f"the first {number(worth)} messages" if isinstance(by[0].op, ast.FloorDiv) else "the first message only"
+    hint = f"'{source.code(test.test, 40)}' holds for {first}: write {source.code(by[0].left, 30)} % {every} == 0"
+    return Clue(hint, source.place(test))
+
+
 def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | None:
     """Return a clue if a condition compares the counter itself, as in `count == 10`."""
     asked = test.test
@@ -555,12 +595,17 @@ def _logged_at_one_number(source: Source, test: ast.If, every: int) -> Clue | No
         not isinstance(asked, ast.Compare)
         or len(asked.ops) != 1
         or not isinstance(asked.left, (ast.Name, ast.Attribute))
+        or not _is_counter(source, asked.left)
     ):
-        return None
-    if number_in_code(source, asked.comparators[0]) is None:
         return None
     hint = f"'{source.code(asked, 40)}' does not hold for every {every}th message: write "
     return Clue(f"{hint}{source.code(asked.left, 30)} % {every} == 0", source.place(test))
+
+
+def _is_counter(source: Source, name: ast.Name | ast.Attribute) -> bool:
+    """Return whether 1 is added to a variable."""
+    statements = [source.parents.get(n) for n in source.stored.get(chain(name), ())]
+    return any(isinstance(s, ast.AugAssign) and number_in_code(source, s.value) == 1 for s in statements)
 
 
 def _inner(node: ast.AST) -> list[ast.AST]:
@@ -612,13 +657,13 @@ def _log_every(case: Case) -> Clue | None:
     test = next(source.around(call, ast.If), None) if call is not None else None
     if call is not None and call in timed and test is None:
         return Clue(f"this logs every message: put it under if count % {every} == 0", source.place(call))
-    if test is not None and (clue := _logged_at_one_number(source, test, every)) is not None:
-        return clue
-    divisions = [n for n in ast.walk(test.test) if isinstance(n, ast.BinOp)] if test is not None else []
+    if test is None:
+        return None
+    divisions = [n for n in ast.walk(test.test) if isinstance(n, ast.BinOp)]
     by = [n for n in divisions if isinstance(n.op, ast.Mod)]
     worth = constant(source, by[0].right) if len(by) == 1 else None
-    if worth is None or test is None:
-        return None
+    if worth is None:
+        return _logged_by_quotient(source, test, divisions, every) or _logged_at_one_number(source, test, every)
     rest = number_in_code(source, test.test.comparators[0]) if isinstance(test.test, ast.Compare) else None
     if rest is not None and rest >= worth.value:
         hint = f"'{source.code(test.test, 40)}' is never true, as it is below {number(worth.value)}: compare with 0"

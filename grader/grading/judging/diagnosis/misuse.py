@@ -25,6 +25,7 @@ from grader.grading.judging.diagnosis.wiring import (
     received,
     sole_assignment,
     target_of,
+    uniform_call,
     variable_of,
 )
 from grader.grading.judging.source import (
@@ -406,8 +407,8 @@ def _to_random(crash: Crash, name: str) -> Clue | None:
     if name not in _RANDOM or call is None or crash.source.functions(name):
         return None
     if name == "random" and len(call.args) == 2:
-        given = ", ".join(crash.source.code(a, 20) for a in call.args)
-        return Clue(f"random takes no limits: write random.uniform({given})")
+        low, high = (crash.source.code(a, 20) for a in call.args)
+        return Clue(f"random takes no limits: write {uniform_call(crash.source, low, high, call)}")
     return Clue(_RANDOM[name])
 
 
@@ -692,8 +693,9 @@ def _whole_number(crash: Crash) -> Clue | None:
     source = crash.source
     for call in _calls(crash):
         if last_name(call.func) in ("randint", "randrange") and any(not _whole(a) for a in call.args):
-            given = ", ".join(source.code(a, 20) for a in call.args)
-            return Clue(f"{last_name(call.func)} takes integers: write random.uniform({given})")
+            given = [source.code(a, 20) for a in call.args]
+            low, high = given[:2] if len(given) > 1 else ("0", given[0])
+            return Clue(f"{last_name(call.func)} takes integers: write {uniform_call(source, low, high, call)}")
         if chain(call.func) == "range":
             return Clue("range takes integers: convert each of them with int(...)")
     if crash.said("indices must be integers"):

@@ -42,6 +42,7 @@ from grader.grading.judging.source import Loop, Source, argument, chain, first_l
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.quantities import seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,16 +286,29 @@ def _waits_to_spin(paced: _Paced) -> Clue | None:
 @hint_rule("topic_rate", given=_paced, priority=9080)
 def _loop_pace(paced: _Paced) -> Clue | None:
     """A loop publishes, but its pause is not the requested period."""
-    if paced.timers() or math.isnan(paced.found_hz):
+    if paced.timers():
         return None
-    source = paced.source
+    source, wanted = paced.source, number(paced.wanted_hz)
     rates = list(source.calls("create_rate", "Rate"))
     worth = constant(source, argument(rates[0], 0, "frequency")) if len(rates) == 1 else None
-    if worth is not None and same_pace(worth.value, paced.found_hz) and not same_pace(worth.value, paced.wanted_hz):
-        hint = f"{source.code(rates[0])} is {number(worth.value)} Hz; {number(paced.wanted_hz)} Hz is required"
+    if worth is not None and worth.value > 0 and _explains(paced, 1 / worth.value):
+        hint = f"{source.code(rates[0])} is {number(worth.value)} Hz"
+        if same_pace(worth.value, paced.period_s):
+            hint += f", a message every {wanted} s: it takes the rate, write {wanted}"
+        else:
+            hint += f"; {wanted} Hz is required"
         return Clue(hint, source.place(worth.origin))
     loops = [n for n in source.loops() if set(paced.calls) & set(reached(source, [n]))]
     return _pace_of(paced, loops[-1]) if loops else None
+
+
+def _explains(paced: _Paced, period_s: float) -> bool:
+    """Return whether a loop with this period publishes as was measured; one that is watched too briefly, as rarely."""
+    if same_pace(period_s, paced.period_s):
+        return False
+    watched_s = seconds(paced.case.trace.stop_ns) - paced.facts.first_s
+    rare = 0 < paced.facts.count <= 2 and paced.facts.count * period_s >= (1 - SAME_PACE) * watched_s
+    return rare if math.isnan(paced.found_hz) else same_pace(1 / period_s, paced.found_hz)
 
 
 def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
@@ -304,7 +318,7 @@ def _pace_of(paced: _Paced, loop: Loop) -> Clue | None:
     if not pauses:
         return _no_pause(paced, loop)
     call = pauses[0].origin
-    if same_pace(1 / total, paced.found_hz) and not same_pace(total, paced.period_s):
+    if _explains(paced, total):
         codes = " and ".join(dict.fromkeys(source.code(p.origin) for p in pauses))
         hint = f"{codes} give{'s' if len(pauses) == 1 else ''} {number(1 / total)} Hz"
         in_all = " in all" if len(pauses) > 1 else ""
@@ -324,7 +338,7 @@ def _no_pause(paced: _Paced, loop: Loop) -> Clue | None:
     waits = {"wait", "wait_for", "get", "join", "sleep", "sleep_until", "sleep_for", "spin_once", "select"}
     waits |= {"now", "time", "monotonic", "perf_counter", "time_ns", "monotonic_ns"}
     inside = names_called(paced.source, [loop])
-    if inside & waits or paced.found_hz < 5 * paced.wanted_hz:
+    if inside & waits or not paced.found_hz >= 5 * paced.wanted_hz:  # NaN if nothing was measured
         return None
     head = "while" if isinstance(loop, ast.While) else "for"
     hint = f"the {head} loop publishes without a pause: use create_timer({number(paced.period_s)}, ...)"

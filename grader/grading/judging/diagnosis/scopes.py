@@ -16,7 +16,7 @@ from grader.grading.judging.diagnosis.names import (
     import_of,
 )
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
-from grader.grading.judging.diagnosis.wiring import made, node_made, received, variable_of
+from grader.grading.judging.diagnosis.wiring import made, node_made, received, shared_names, variable_of
 from grader.grading.judging.source import (
     Function,
     Source,
@@ -260,7 +260,8 @@ def _global_meant(source: Source, name: str, function: Function, stores: list[as
     shadowed = bool(outside) or any(f.name == name for f in source.functions()) or name in source.aliases
     if outside:
         hint = f"{function.name} assigns {name}, so Python treats it as local: "
-        return Clue(f"{hint}begin {function.name} with: global {name}", source.place(stores[0]))
+        names = shared_names(source, function, name)
+        return Clue(f"{hint}begin {function.name} with: global {names}", source.place(stores[0]))
     if shadowed and first_line(stores[0]) > 0:
         hint = f"{function.name} assigns {name} here, which hides what it meant: choose another name"
         return Clue(hint, source.place(stores[0]))

@@ -17,6 +17,7 @@ from grader.grading.judging.diagnosis.wiring import (
     spin_for,
     target_of,
     text_in_code,
+    text_origin,
 )
 from grader.grading.judging.facts import OtherEnd
 from grader.grading.judging.source import (
@@ -85,7 +86,9 @@ def _other_service(end: _End) -> Clue | None:
         call, written = fitting[0]
         does = "asks" if end.kind == "client" else "offers"
         hint = f"{source.code(call)} {does} {quote(found, 60)}: the task asks for {end.service}"
-        return Clue(hint + elsewhere_because(written, end.service), source.place(call))
+        because = elsewhere_because(written, end.service)
+        origin = call if because else text_origin(source, argument(call, 1, "srv_name"), call)
+        return Clue(hint + because, source.place(origin))
     return None
 
 

@@ -12,6 +12,7 @@ from grader.grading.judging.diagnosis.rules import (
     Clue,
     file_for,
     hint_rule,
+    log_call,
     silent_topic,
     unheard_topic,
 )
@@ -24,6 +25,7 @@ from grader.grading.judging.diagnosis.wiring import (
     head_of,
     is_flag,
     is_log,
+    is_read,
     made,
     made_for,
     names_called,
@@ -33,16 +35,20 @@ from grader.grading.judging.diagnosis.wiring import (
     reached,
     roots,
     runs,
+    shared_names,
     short,
     spins,
+    switches,
     target_of,
+    text_origin,
+    time_since,
     timer_code,
     used,
     value_of,
     variable_of,
     waits_for_ever,
 )
-from grader.grading.judging.facts import RateFacts, WrongLogFacts
+from grader.grading.judging.facts import LogPaceFacts, RateFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import student_records
 from grader.grading.judging.source import (
     Function,
@@ -170,8 +176,9 @@ def _wrong_topic(case: Case) -> Clue | None:
 def _elsewhere(source: Source, item: Made, found: str, topic: str) -> Clue:
     does = "publishes on" if item.kind == "publisher" else "subscribes to"
     hint = f"{source.code(item.call)} {does} {quote(found, 60)}: the task asks for {topic}"
-    hint += elsewhere_because(item.topic, topic)
-    return Clue(hint, source.place(item.call), key=f"topic:{source.file}:{item.call.lineno}")
+    because = elsewhere_because(item.topic, topic)
+    origin = item.call if because else text_origin(source, argument(item.call, 1, "topic"), item.call)
+    return Clue(hint + because, source.place(origin), key=f"topic:{source.file}:{item.call.lineno}")
 
 
 @hint_rule("publishes", "subscribes", priority=8040)
@@ -313,8 +320,38 @@ def _never_publishes(case: Case) -> Clue | None:
     item = made_for(source, "publisher", topic) if topic else None
     if item is None or any(last_name(n) == "publish" for n in source.names()) or unheard_topic(case):
         return None
-    hint = f"{source.code(item.call)} creates a publisher, but nothing in the file calls its publish()"
-    return Clue(hint, source.place(item.call))
+    return _message_not_sent(source, item) or Clue(
+        f"{source.code(item.call)} creates a publisher, but nothing in the file calls its publish()",
+        source.place(item.call),
+    )
+
+
+def _message_not_sent(source: Source, publisher: Made) -> Clue | None:
+    """Return the last line that sets a message of a publisher's type, where there is only one."""
+    makers = [c for c in source.calls(publisher.type) if target_of(source, c)] if publisher.type else []
+    owner = target_of(source, publisher.call)
+    function = source.function_of(makers[0]) if len(makers) == 1 else None
+    if function is None or not owner or function.name == "__init__":
+        return None
+    around = (function, *source.around(function, ast.FunctionDef), None)
+    seen = source.is_method(function) if "." in owner else source.function_of(publisher.call) in around
+    if not seen:
+        return None
+    name = target_of(source, makers[0])
+    send = f"{owner}.publish({name})"
+    given = next(
+        (r for r in source.all(ast.Return) if source.function_of(r) is function and chain(r.value) == name), None
+    )
+    if given is not None:
+        hint = f"{source.code(given)} publishes nothing, as nobody receives it: write {send}"
+        return Clue(hint, source.place(given))
+    made_at = source.parents[makers[0]]
+    inside = [n for n in subtree(function) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+    sets = [n for n in inside if chain(n).startswith(f"{name}.") and first_line(n) > first_line(made_at)]
+    last = max([made_at, *sets], key=first_line)
+    level = next((t for t in reversed([*source.around(last, ast.If)]) if made_at not in set(subtree(t))), None)
+    where = "below this line" if level is None else f"after the block of 'if {source.code(level.test, 30)}'"
+    return Clue(f"{name} is never published: add {send} {where}", source.place(last))
 
 
 @hint_rule(given=_unseen, priority=8100)
@@ -417,14 +454,19 @@ def _kept_elsewhere(source: Source, waited: str) -> Clue | None:
         if not mine or declared or not any(source.function_of(n) is None for n in stores):
             return None
         hint = f"{name} assigns {waited}, so Python treats it as local"
-        return Clue(f"{hint}: begin {name} with: global {waited}", source.place(mine[0]))
+        names = shared_names(source, function, waited) if isinstance(function, Function) else waited
+        return Clue(f"{hint}: begin {name} with: global {names}", source.place(mine[0]))
     if not stores or not all(early):
         return None
     chosen = [n for n in locals_ if n.id == bare] or locals_
     if chosen:
         kept = min(chosen, key=first_line)
         return Clue(f"{kept.id} is local to {name}: assign to {waited}", source.place(kept))
-    return Clue(f"nothing sets {waited}: assign the message to it in {name}", source.place(function))
+    fields = [n for n in inside if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)]
+    unread = [n for n in fields if chain(n).startswith("self.") and not is_read(source, chain(n))]
+    hint = f"nothing sets {waited}: assign the message to it in {name}"
+    hint = f"{chain(unread[0])} is not read: assign to {waited}" if len(unread) == 1 else hint
+    return Clue(hint, source.place(unread[0] if len(unread) == 1 else function))
 
 
 @hint_rule(given=_unseen, priority=8150)
@@ -619,6 +661,30 @@ def _only_when_told(unseen: _Unseen) -> Clue | None:
         if not _heard(unseen.case, item.topic) and not any(c in timed for c in calls):
             hint = f"this runs only when a message arrives on {quote(item.topic, 60)}, and none does: use a timer"
             return Clue(hint, source.place(item.call), key=f"told:{item.call.lineno}")
+    return None
+
+
+@hint_rule(priority=8252)
+def _time_moves_always(case: Case) -> Clue | None:
+    """The time of the last log is stored with each message, so that it is never long ago."""
+    pace, wrong = case.found(LogPaceFacts), case.found(WrongLogFacts)
+    rare = pace is not None and (pace.count <= 2 or pace.average_s > pace.wanted_s)
+    few = wrong is not None and (wrong.right == 0 or wrong.cause == "few")
+    call, source = log_call(case), case.source
+    if call is None or not (rare or few):
+        return None
+    heard = [m for m in made(source, "subscription") if m.topic is not None and _heard(case, m.topic)]
+    inside = {n for m in heard for n in runs(source, m)}
+    waits = {switch.node for switch in switches(source) if switch.limit.value > 0}
+    for test in (t for t in source.around(call, ast.If) if t in inside and waits & set(ast.walk(t.test))):
+        passed = time_since(source, test.test)
+        stores = source.stores(chain(passed.right)) if passed is not None else []
+        statements = [s for n in stores if (s := source.parents.get(n)) is not None]
+        beside = [s for s in statements if source.parents.get(s) is source.parents.get(test)]
+        if beside:
+            code, asked = source.code(beside[0]), source.code(test.test, 40)
+            hint = f"{code} runs for each message, so '{asked}' is hardly ever true: indent it under the if"
+            return Clue(hint, source.place(beside[0]), key="log_pace")
     return None
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -16,12 +15,14 @@ from grader.grading.judging.diagnosis.wiring import (
     made,
     made_for,
     number_in_code,
+    own_uniform,
     roots,
     runs,
     target_of,
+    uniform_call,
     variable_of,
 )
-from grader.grading.judging.facts import DrawFacts, SeriesFacts
+from grader.grading.judging.facts import DrawFacts
 from grader.grading.judging.source import Function, Source, chain, first_line, last_name, words
 from grader.grading.judging.values import as_number, leaves, number_path, published, published_numbers, value_at
 from grader.grading.model.exercise import ProblemKind
@@ -33,10 +34,8 @@ _DRAWS = words(
     "uniform randint random randrange gauss normalvariate choice choices normal rand randn triangular integers sample "
     "betavariate random_sample randbelow urandom getrandom randbytes token_bytes getrandbits randbits standard_normal"
 )
-#: Functions that convert an angle.
-_TO_DEGREES, _TO_RADIANS = ("degrees", "rad2deg"), ("radians", "deg2rad")
-#: What assigns the result of an operator.
-_SIGNS: dict[type[ast.operator], str] = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*=", ast.Div: "/="}
+#: Functions that convert an angle to radians.
+_TO_RADIANS = ("radians", "deg2rad")
 #: How many levels of an expression around a random draw are followed.
 _DEEPEST = 12
 
@@ -103,11 +102,6 @@ def _place_of(got: _Given) -> ast.AST:
     """Return the node to point at: the definition of the number, if it has a name."""
     named = got.worth is not None and isinstance(got.value, (ast.Name, ast.Attribute))
     return got.worth.origin if named and got.worth is not None else got.node
-
-
-def _first_values(case: Case) -> list[object]:
-    facts = case.found(SeriesFacts)
-    return [] if facts is None else list(facts.first)
 
 
 def draws(source: Source) -> list[ast.Call]:
@@ -349,239 +343,6 @@ def _number_clue(source: Source, got: _Given, path: str, value: float, want: flo
     return Clue(hint, source.place(place))
 
 
-@hint_rule("field_function", priority=10080)
-def _set_after_publishing(case: Case) -> Clue | None:
-    """The field is set after the message was published."""
-    source, values = case.source, _first_values(case)
-    if len(values) < 2 or any(value != 0 for value in values):
-        return None
-    for place in given_leaf(source, case.check.field.rpartition(".")[2]):
-        function = source.function_of(place)
-        name = _message_of(place)
-        early = [c for c in source.calls("publish") if source.function_of(c) is function and _publishes(c, name)]
-        if function is not None and early and all(first_line(c) < first_line(place) for c in early):
-            hint = f"{source.code(place)} comes after {source.code(early[0])}: set the field first, then publish"
-            return Clue(hint, source.place(place))
-    return None
-
-
-def _message_of(place: ast.AST) -> str:
-    targets = place.targets if isinstance(place, ast.Assign) else []
-    return next((chain(t.value) for t in targets if isinstance(t, ast.Attribute)), "")
-
-
-def _publishes(call: ast.Call, name: str) -> bool:
-    return bool(name) and any(chain(argument) == name for argument in call.args)
-
-
-@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10090)
-def _in_degrees(case: Case) -> Clue | None:
-    """The argument of a sine is converted between degrees and radians."""
-    source = case.source
-    places = given_leaf(source, case.check.field.rpartition(".")[2])
-    inside = [n for p in places for n in ast.walk(p) if isinstance(n, ast.Call)]
-    turned = [n for n in inside if last_name(n.func) in (*_TO_DEGREES, *_TO_RADIANS)]
-    if len(turned) != 1 or "deg" in str(case.check.formula) or len(turned[0].args) != 1:
-        return None
-    argument = source.code(turned[0].args[0], 40)
-    way = "radians to degrees" if last_name(turned[0].func) in _TO_DEGREES else "degrees to radians"
-    hint = f"{source.code(turned[0])} converts {way}: write {argument}"
-    return Clue(hint, source.place(turned[0]))
-
-
-@hint_rule("field_function", priority=10100)
-def _other_function(case: Case) -> Clue | None:
-    """`cos` for `sin`, or a division that rounds down."""
-    source, formula = case.source, str(case.check.formula)
-    inside = [n for p in given_leaf(source, case.check.field.rpartition(".")[2]) for n in ast.walk(p)]
-    turned = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) in ("sin", "cos", "tan")]
-    wrong = [n for n in turned if f"{last_name(n.func)}(" not in formula]
-    right = next((f for f in ("sin", "cos", "tan") if f"{f}(" in formula), "")
-    if len(wrong) == 1 and right:
-        hint = f"{source.code(wrong[0])} does not compute {formula}: write math.{right}"
-        return Clue(hint, source.place(wrong[0]))
-    whole = [n for n in inside if isinstance(n, ast.BinOp) and isinstance(n.op, ast.FloorDiv)]
-    if len(whole) == 1:
-        code = source.code(whole[0], 40)
-        return Clue(f"{code} rounds down to an integer: write / instead of //", source.place(whole[0]))
-    return None
-
-
-@hint_rule("field_function", priority=10110)
-def _counter_reset(case: Case) -> Clue | None:
-    """The counter is set to its first value before each message."""
-    source = case.source
-    timed = {n for m in made(source, "timer") for n in runs(source, m)}
-    for counter in _counters(case):
-        for store in source.stores(counter):
-            statement = source.parents.get(store)
-            value = getattr(statement, "value", None)
-            plain = isinstance(statement, ast.Assign) and isinstance(value, ast.Constant)
-            if statement is not None and plain and store in timed and not any(source.around(statement, ast.If)):
-                hint = f"{source.code(statement)} resets it with each message: set it only in __init__"
-                return Clue(hint, source.place(statement))
-    return None
-
-
-@hint_rule("field_function", priority=10120)
-def _counts_sometimes(case: Case) -> Clue | None:
-    """The counter grows only on a condition, or `=+ 1` assigns the same number each time."""
-    source = case.source
-    for counter in _counters(case):
-        for store in source.stores(counter):
-            statement = source.parents.get(store)
-            value = getattr(statement, "value", None)
-            if statement is None or source.function_name(store) in ("", "__init__"):
-                continue
-            if isinstance(statement, ast.Assign) and isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.UAdd):
-                code = source.code(statement)
-                hint = f"{code} assigns {source.code(value.operand)} each time: write {counter} += "
-                return Clue(f"{hint}{source.code(value.operand)}", source.place(statement))
-            test = next(source.around(statement, ast.If), None)
-            grows = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
-            if grows and test is not None and _publishes_beside(source, test):
-                hint = f"{source.code(statement)} runs only under 'if {source.code(test.test, 40)}': "
-                return Clue(f"{hint}dedent it, so that it counts each message", source.place(statement))
-    return None
-
-
-def _publishes_beside(source: Source, test: ast.If) -> bool:
-    """Return whether messages are published in the function of a condition, and not under it."""
-    function = source.function_of(test)
-    sends = [c for c in source.calls("publish") if source.function_of(c) is function]
-    return bool(sends) and not any(test in list(source.around(c, ast.If)) for c in sends)
-
-
-@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10130)
-def _needless_pi(case: Case) -> Clue | None:
-    """The value is computed with pi, which the formula does not have."""
-    formula = str(case.check.formula)
-    for place in given_leaf(case.source, case.check.field.rpartition(".")[2]):
-        value = getattr(place, "value", None)
-        named = [n for n in ast.walk(value) if last_name(n) in ("pi", "tau")] if isinstance(value, ast.expr) else []
-        if named and "pi" not in formula:
-            hint = f"{case.source.code(place)} uses {last_name(named[0])}, which {formula} does not: remove it"
-            return Clue(hint, case.source.place(place))
-    return None
-
-
-@hint_rule("field_function", priority=10135)
-def _counts_by_another_step(case: Case) -> Clue | None:
-    """The counter grows by another number than 1."""
-    source = case.source
-    for counter in _counters(case):
-        for store in source.stores(counter):
-            statement = source.parents.get(store)
-            step = number_in_code(source, statement.value) if isinstance(statement, ast.AugAssign) else None
-            adds = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
-            if statement is not None and adds and step not in (None, 1.0) and "n" in str(case.check.formula):
-                hint = f"{source.code(statement)} counts {number(step or 0.0)} for each message: write {counter} += 1"
-                return Clue(hint, source.place(statement))
-    return None
-
-
-@hint_rule("field_function", "service_sequence", priority=10138)
-def _result_thrown_away(case: Case) -> Clue | None:
-    """`self.count + 1` as a statement, for `+=`, or `self.count == 0`, for `=`."""
-    for source in case.sources.values():
-        for statement in source.all(ast.Expr):
-            value = statement.value
-            if isinstance(value, ast.BinOp) and isinstance(value.left, (ast.Name, ast.Attribute)):
-                sign, right, does = _SIGNS.get(type(value.op), ""), value.right, "changes"
-            elif isinstance(value, ast.Compare) and isinstance(value.left, (ast.Name, ast.Attribute)):
-                sign = "=" if len(value.ops) == 1 and isinstance(value.ops[0], ast.Eq) else ""
-                right, does = value.comparators[0], "sets"
-            else:
-                continue
-            if sign:
-                instead = f"{source.code(value.left)} {sign} {source.code(right, 40)}"
-                return Clue(f"{source.code(value)} {does} nothing: write {instead}", source.place(statement))
-    return None
-
-
-@hint_rule("field_function", priority=10140)
-def _counter_never_changes(case: Case) -> Clue | None:
-    """The counter never changes."""
-    values = _first_values(case)
-    if len(values) < 2 or len(set(map(repr, values))) > 1:
-        return None
-    for counter in _counters(case):
-        if all(case.source.function_name(s) == "__init__" for s in case.source.stores(counter)):
-            sends = list(case.source.calls("publish"))
-            place = case.source.place(sends[0]) if len(sends) == 1 else None
-            return Clue(f"{counter} never changes: write {counter} += 1 after each message", place)
-    return None
-
-
-@hint_rule("field_function", priority=10145)
-def _from_the_clock(case: Case) -> Clue | None:
-    """The value follows the clock, where the formula follows the number of the message."""
-    source, places = case.source, given_leaf(case.source, case.check.field.rpartition(".")[2])
-    if len(places) != 1 or any(source.all(ast.AugAssign)) or re.search(r"\bt\b", str(case.check.formula)):
-        return None
-    function = source.function_of(places[0])
-    clocks = [c for c in source.calls("now", "time", "monotonic", "perf_counter") if source.function_of(c) is function]
-    if not clocks:
-        return None
-    hint = f"{source.code(places[0], 50)} follows the clock: {case.check.formula} follows the number of the message, "
-    return Clue(f"{hint}so count the messages", source.place(places[0]))
-
-
-@hint_rule("field_function", problem=ProblemKind.COUNT_START, priority=10150)
-def _count_starts_elsewhere(case: Case) -> Clue | None:
-    """The count starts at another number than 0, or is incremented before its use."""
-    source, problem = case.source, case.verdict.problem
-    start = str(problem.start if problem is not None else None)
-    for counter in _counters(case):
-        for store in source.stores(counter):
-            statement = source.parents.get(store)
-            value = getattr(statement, "value", None)
-            if isinstance(statement, ast.Assign) and isinstance(value, ast.Constant) and str(value.value) == start:
-                hint = f"{source.code(statement)} starts the count at {start}: the first message is n = 0"
-                return Clue(hint, source.place(statement))
-            if isinstance(statement, ast.AugAssign) and start == "1" and _used_later(source, statement, counter):
-                hint = f"{source.code(statement)} comes before the value is computed: count after it"
-                return Clue(hint, source.place(statement))
-    return None
-
-
-def _used_later(source: Source, statement: ast.AST, counter: str) -> bool:
-    function = source.function_of(statement)
-    loads = [n for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load) and chain(n) == counter]
-    lines = [first_line(n) for n in loads if source.function_of(n) is function]
-    return bool(lines) and min(lines) > first_line(statement)
-
-
-def _counters(case: Case) -> Iterator[str]:
-    """Yield the attributes of the node that a field's value depends on, also through one local variable."""
-    source = case.source
-    for place in given_leaf(source, case.check.field.rpartition(".")[2]):
-        value = getattr(place, "value", None)
-        if not isinstance(value, ast.expr):
-            continue
-        yield from _attributes(value)
-        for local in [n.id for n in ast.walk(value) if isinstance(n, ast.Name)]:
-            for statement in source.all(ast.Assign):
-                same = source.function_of(statement) is source.function_of(place)
-                if same and any(chain(target) == local for target in statement.targets):
-                    yield from _attributes(statement.value)
-
-
-def _attributes(value: ast.expr) -> Iterator[str]:
-    for node in ast.walk(value):
-        if isinstance(node, ast.Attribute) and chain(node).startswith("self.") and chain(node).count(".") == 1:
-            yield chain(node)
-
-
-@hint_rule("field_function", problem=ProblemKind.WRONG_VALUE, priority=10155)
-def _value_line(case: Case) -> Clue | None:
-    """Only the line that computes the value is known, and what the check says about it."""
-    places = given_leaf(case.source, case.check.field.rpartition(".")[2])
-    if len(places) != 1 or not case.verdict.hint:
-        return None
-    return Clue(case.verdict.hint, case.source.place(places[0]))
-
-
 @hint_rule("random_in_range", problem=ProblemKind.NO_NUMBER, priority=10160)
 def _drawn_as_text(case: Case) -> Clue | None:
     """The type of the messages has no number."""
@@ -601,7 +362,7 @@ def _draw_limits(case: Case) -> Clue | None:
     if facts is None or not (facts.outside or facts.narrow) or len(calls) != 1:
         return None
     call, low, high = calls[0], number(check.low), number(check.high)
-    right = f"random.uniform({float(check.low)}, {float(check.high)})"
+    right = uniform_call(source, str(float(check.low)), str(float(check.high)), call)
     if last_name(call.func) in ("gauss", "normalvariate", "normal") and not list(source.calls("min", "max", "clip")):
         hint = f"{source.code(call)} has no limits, so some values lie far outside: use {right}"
         return Clue(hint, source.place(call), key="draw")
@@ -627,9 +388,10 @@ def _scaled_draw(source: Source, check: Any, call: ast.Call, facts: DrawFacts) -
         return None
     if check.low <= min(known) and max(known) <= check.high and not facts.narrow:
         return None
+    low, high = float(check.low), float(check.high)
+    right = own_uniform(source, str(low), str(high), call) or f"{low} + {source.code(call, 40)} * {high - low}"
     hint = f"{source.code(whole)} goes from {number(min(known))} to {number(max(known))}"
-    right = f"random.uniform({float(check.low)}, {float(check.high)})"
-    return Clue(f"{hint}: {right}", source.place(whole), key="draw")
+    return Clue(f"{hint}: write {right}", source.place(whole), key="draw")
 
 
 def _with(source: Source, node: ast.AST, call: ast.Call, drawn: float, depth: int = 0) -> float | None:
@@ -734,5 +496,5 @@ def _not_drawn(case: Case) -> Clue | None:
     if len(places) != 1:
         return None
     code = source.code(places[0])
-    hint = f"{code} is not random: random.uniform({float(check.low)}, {float(check.high)}) gives a new value each time"
-    return Clue(hint, source.place(places[0]))
+    right = uniform_call(source, str(float(check.low)), str(float(check.high)))
+    return Clue(f"{code} is not random: for a new value each time, write {right}", source.place(places[0]))

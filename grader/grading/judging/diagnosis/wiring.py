@@ -195,6 +195,33 @@ def given_leaf(source: Source, leaf: str) -> list[ast.AST]:
     return found + [k for k in keywords if k.arg == leaf]
 
 
+#: What makes an object with a method `uniform` of its own.
+_GENERATORS = ("random.Random", "random.SystemRandom", "numpy.random.default_rng", "numpy.random.RandomState")
+
+
+def own_uniform(source: Source, low: str, high: str, like: ast.Call | None = None) -> str:
+    """Return the call of `uniform` by what the file imports and calls in another draw; empty if it imports neither."""
+    owner = like.func.value if like is not None and isinstance(like.func, ast.Attribute) else None
+    made_by = value_of(source, owner)
+    generator = isinstance(made_by, ast.Call) and source.resolved(made_by.func) in _GENERATORS
+    if owner is not None and (generator or source.resolved(owner) in ("random", "numpy.random")):
+        return f"{chain(owner)}.uniform({low}, {high})"
+    meant = ("random.uniform", "numpy.random.uniform")
+    function = next((name for name, dotted in source.aliases.items() if dotted in meant), "")
+    module = next((name for name, dotted in source.aliases.items() if dotted == "random"), "")
+    if function or "random" in source.stars:
+        return f"{function or 'uniform'}({low}, {high})"
+    return f"{module}.uniform({low}, {high})" if module else ""
+
+
+def uniform_call(source: Source, low: str, high: str, like: ast.Call | None = None) -> str:
+    """Return the call of `uniform` that a file can make, followed by the import that it lacks."""
+    own = own_uniform(source, low, high, like)
+    if own or not any(dotted.startswith("random.") for dotted in source.aliases.values()):
+        return own or f"random.uniform({low}, {high})"
+    return f"uniform({low}, {high}), and import it with from random import uniform"
+
+
 #: Maximum number of publishers, subscriptions or timers examined, of each kind.
 MOST_MADE = 20
 
@@ -247,6 +274,16 @@ def text_in_code(source: Source, node: ast.expr | None, depth: int = 0) -> str |
     else:
         return None
     return text_in_code(source, values[0], depth + 1) if len(values) == 1 else None
+
+
+def text_origin(source: Source, node: ast.expr | None, otherwise: ast.AST) -> ast.AST:
+    """Return the literal of a text, also of one that has a name; `otherwise` if the text does not show it."""
+    for _ in range(3):
+        if text_of(node) is not None and node is not None:
+            return node
+        value = value_of(source, node)
+        node = value if isinstance(value, ast.expr) else None
+    return otherwise
 
 
 def goes_to(written: str | None, topic: str) -> bool:
@@ -615,6 +652,46 @@ def returns_nothing(source: Source, call: ast.Call) -> bool:
         returns = [r for r in source.all(ast.Return) if r.value is not None and source.function_of(r) in functions]
         return not returns and not any(isinstance(f, ast.AsyncFunctionDef) for f in functions)
     return last_name(call.func) in (*_NOTHING, *LOG_METHODS) and isinstance(call.func, ast.Attribute)
+
+
+def set_at_first_only(source: Source, counter: str) -> bool:
+    """Return whether an attribute is set in the constructor alone, or a variable to a number outside of any loop."""
+    stores = source.stored.get(counter, ())
+    if "." in counter:
+        return all(source.function_name(s) == "__init__" for s in stores)
+    values = [getattr(source.parents.get(s), "value", None) for s in stores]
+    plain = all(isinstance(source.parents.get(s), ast.Assign) for s in stores)
+    looped = any(any(source.around(s, kind)) for s in stores for kind in (ast.While, ast.For))
+    return plain and not looped and all(isinstance(value, ast.Constant) for value in values)
+
+
+def shared_names(source: Source, function: Function, first: str) -> str:
+    """Return the variables of the file that a function assigns as its own and others read, one of them first."""
+    outside = {n for n, places in source.stored.items() if any(_of_the_file(source, place) for place in places)}
+    inside = set(subtree(function))
+    mine = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    elsewhere = {n.id for n in source.all(ast.Name) if isinstance(n.ctx, ast.Load) and n not in inside}
+    declared = {name for n in inside if isinstance(n, ast.Global) for name in n.names}
+    return ", ".join([first, *sorted((mine & outside & elsewhere) - declared - {first})])
+
+
+def _of_the_file(source: Source, place: ast.AST) -> bool:
+    return source.function_of(place) is None and source.class_of(place) is None
+
+
+def is_read(source: Source, dotted: str) -> bool:
+    """Return whether the value of a name or an attribute is used anywhere in the file."""
+    return any(isinstance(n.ctx, ast.Load) and chain(n) == dotted for n in source.names())
+
+
+def time_since(source: Source, test: ast.expr) -> ast.BinOp | None:
+    """Return `now - self.last` of a condition, also through a local variable; None if it compares no such time."""
+    local = [v for n in ast.walk(test) if isinstance(n, ast.Name) and (v := sole_assignment(source, n)) is not None]
+    for node in (n for tree in (test, *local) for n in ast.walk(tree)):
+        last = chain(node.right) if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub) else ""
+        if isinstance(node, ast.BinOp) and last.startswith("self.") and last.count(".") == 1:
+            return node
+    return None
 
 
 def spin_timeout(call: ast.Call) -> ast.expr | None:

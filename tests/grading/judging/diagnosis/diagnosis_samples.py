@@ -342,18 +342,36 @@ _SWINGS: dict[str, Callable[[int], float]] = {
     "right": lambda n: math.sin(0.1 * n),
     "zero": lambda _: 0.0,
     "from_one": lambda n: math.sin(0.1 * (n + 1)),
+    "factor_outside": lambda n: math.sin(n) * 0.1,
+    "undivided": lambda n: math.sin(n / 0.1),
+    "small_step": lambda n: math.sin(0.01 * n),
+    "no_step": math.sin,
+    "raised": lambda n: math.sin(0.1 * n) + 1.0,
+    "unsigned": lambda n: abs(math.sin(0.1 * n)),
+    "one_decimal": lambda n: round(math.sin(0.1 * n), 1),
+}
+_EVERY_TENTH: dict[str, Callable[[int], bool]] = {
+    "right": lambda n: n % 10 == 0,
+    "first_ten": lambda n: n // 10 == 0,
+    "first": lambda n: n == 0,
 }
 
 
-def swinging(what: str = "right") -> Recording:
-    """A joint publisher that logs every tenth message."""
+def swinging(what: str = "right", logs: str = "right") -> Recording:
+    """A joint publisher that logs every tenth message, or others."""
     rec = Recording(12.1, process="simple_publisher.py")
     rec.endpoint("publisher", "/joint_commands", FLOAT64, "/joint_commander")
     for n in range(120):
         rec.number(0.1 + 0.1 * n, "/joint_commands", _SWINGS[what](n), FLOAT64)
-        if n % 10 == 0:
+        if _EVERY_TENTH[logs](n):
             rec.log(0.1 + 0.1 * n, f"sent {_SWINGS[what](n):.2f} rad")
     return rec
+
+
+def still() -> Recording:
+    """A joint publisher that publishes nothing."""
+    rec = Recording(60.0, process="simple_publisher.py")
+    return rec.endpoint("publisher", "/joint_commands", FLOAT64, "/joint_commander")
 
 
 def greeting(period: float = 1.0) -> Recording:
@@ -419,6 +437,7 @@ RECORDINGS: dict[str, tuple[str, Callable[..., Recording]]] = {
     "answering_late": ("controller_alone", answering_late),
     "answering_once": ("controller_alone", answering_once),
     "swinging": ("alone", swinging),
+    "still": ("alone", still),
     "asking_once": ("client_waits", asking_once),
     "unanswered": ("client_waits", unanswered),
     "greeting": ("defaults", greeting),
