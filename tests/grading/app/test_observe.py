@@ -35,6 +35,7 @@ from grader.runtime.model.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.runtime.sandbox.bubblewrap import ROOT_NAME, USER_NAME
 from grader.runtime.session import Job
 
 FLOAT = "std_msgs/msg/Float32"
@@ -295,6 +296,50 @@ def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: s
     )
     summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
     assert [r.text for r in summary.records] == ["from the other package"]
+
+
+LOOKS = """import os, sys
+import rclpy
+from rclpy.utilities import remove_ros_args
+def main():
+    rclpy.init()
+    node = rclpy.create_node("looks")
+    words = node.declare_parameter("words", "").value
+    for place in (*remove_ros_args(sys.argv)[1:], words):
+        node.get_logger().info(str(os.path.exists(place)))
+    with open(os.path.join(sys.argv[1], "..", "..", "log.csv"), "w") as file:
+        node.get_logger().info(f"wrote {file.write('one')} beside")
+"""
+FINDS = """import os
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+from launch import LaunchDescription
+from launch.substitutions import PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackagePrefix, FindPackageShare
+
+def generate_launch_description():
+    share = get_package_share_directory("finds")
+    return LaunchDescription([Node(package="finds", executable="looks", arguments=[
+        get_package_prefix("finds"),
+        os.path.join(get_package_prefix("finds"), "..", ".."),
+        PathJoinSubstitution([FindPackagePrefix("finds"), "share", "finds"]),
+        PathJoinSubstitution([FindPackageShare("finds"), "package.xml"]),
+        os.path.join(share, "nothing"),
+    ], parameters=[{"words": os.path.join(share, "package.xml")}])])
+"""
+
+
+@pytest.mark.ros
+def test_a_node_finds_the_folders_that_its_launch_file_has_found(tmp_path: Path) -> None:
+    """They are given to it as arguments and parameters; the workspace above them can be written to, as after colcon."""
+    a_package(tmp_path, "finds", looks=LOOKS)
+    setup = tmp_path / "finds" / "setup.py"
+    setup.write_text(setup.read_text().replace("setup(", 'setup(data_files=[("share/finds", ["package.xml"])], ', 1))
+    (tmp_path / "finds" / "finds.launch.py").write_text(FINDS)
+    summary = observe(ObserveRequest((tmp_path / "finds" / "finds.launch.py",), NS_PER_S, clock="virtual"), quiet)
+    if summary.isolation not in (ROOT_NAME, USER_NAME):
+        pytest.skip("processes have no view of files of their own here")
+    assert [r.text for r in summary.records] == [*["True"] * 4, "False", "True", "wrote 3 beside"]
 
 
 SAYS = """import rclpy
