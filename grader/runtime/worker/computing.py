@@ -13,7 +13,7 @@ from grader.runtime.usage import Activity, Kernel
 COMPUTES_NS = NS_PER_S
 
 
-class Look(NamedTuple):
+class ComputedWork(NamedTuple):
     """What was found: the processes that compute, and how long threads have waited for a processor.
 
     While a process neither sleeps nor reads nor writes, it tells nobody anything, and its threads wait for nobody's
@@ -24,7 +24,7 @@ class Look(NamedTuple):
     waited_ns: Collection[int]
 
 
-class _Known(NamedTuple):
+class _DoneWork(NamedTuple):
     """What a process has done, since when it has done nothing else, and how long its threads had waited by then."""
 
     activity: Activity
@@ -41,9 +41,9 @@ class ComputingProcesses:
 
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
-        self._known: dict[int, _Known] = {}
+        self._known: dict[int, _DoneWork] = {}
 
-    def look(self, pids: Collection[int], now_ns: int) -> Look:
+    def look(self, pids: Collection[int], now_ns: int) -> ComputedWork:
         """Look at processes.
 
         Args:
@@ -53,10 +53,10 @@ class ComputingProcesses:
         before = self._known
         self._known = known = {pid: self._looked_at(pid, before.get(pid), now_ns) for pid in pids}
         computing = {pid for pid, one in known.items() if now_ns - one.since_ns >= COMPUTES_NS}
-        return Look(computing, [waited_ns for one in known.values() for waited_ns in one.waited_ns])
+        return ComputedWork(computing, [waited_ns for one in known.values() for waited_ns in one.waited_ns])
 
-    def _looked_at(self, pid: int, before: _Known | None, now_ns: int) -> _Known:
+    def _looked_at(self, pid: int, before: _DoneWork | None, now_ns: int) -> _DoneWork:
         activity = self._kernel.activity(pid)
         if before is not None and activity.is_known and activity == before.activity:
             return before
-        return _Known(activity, now_ns, self._kernel.threads_starved_ns([pid]).values())
+        return _DoneWork(activity, now_ns, self._kernel.threads_starved_ns([pid]).values())
