@@ -14,6 +14,7 @@ from tiers import each, more
 from grader.grading.app import observe as observing
 from grader.grading.app.inputs import read_simulations
 from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.programs import find_targets, stage
 from grader.grading.judging.summary import summarise
 from grader.grading.model.report import Summary
 from grader.grading.reporting.observed import render_summary, summary_to_json, without_libraries
@@ -296,6 +297,32 @@ def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: s
     )
     summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
     assert [r.text for r in summary.records] == ["from the other package"]
+
+
+def test_a_module_is_staged_with_the_folder_of_its_package(tmp_path: Path) -> None:
+    """A Python package without package.xml: what is told names the folder, and modules above are found."""
+    for folder in ("talk", "talk/core"):
+        (tmp_path / "more" / folder).mkdir(parents=True)
+        (tmp_path / "more" / folder / "__init__.py").touch()
+    file = tmp_path / "more" / "talk" / "core" / "say.py"
+    file.write_text("from ..words import WORD\n")
+    (tmp_path / "more" / "talk" / "words.py").write_text("WORD = 1\n")
+    (tmp_path / "more" / "beside.py").touch()
+    submission = stage(find_targets((file,)).targets, tmp_path)
+    assert submission.files["say.py"].found == "talk/core/say.py"
+    names = {path.relative_to(submission.root).as_posix() for path in Path(submission.root).rglob("*.py")}
+    assert names == {"talk/__init__.py", "talk/words.py", "talk/core/__init__.py", "talk/core/say.py"}
+
+
+@pytest.mark.ros
+def test_an_import_from_above_a_package_is_told_with_its_folder(tmp_path: Path) -> None:
+    """Of a file `__init__.py` there are many."""
+    (tmp_path / "talk").mkdir()
+    (tmp_path / "talk" / "__init__.py").write_text("from ..words import WORD\n")
+    (tmp_path / "talk" / "say.py").touch()
+    (fault,) = observe(ObserveRequest((tmp_path / "talk" / "say.py",), NS_PER_S, clock="virtual"), quiet).faults
+    assert (fault.file, fault.line) == ("talk/__init__.py", 1)
+    assert fault.text.startswith("ImportError: attempted relative import beyond top-level package")
 
 
 LOOKS = """import os, sys
