@@ -58,6 +58,10 @@ class Kernel(Protocol):
         """See `thread_starved_ns`."""
         ...
 
+    def activity(self, pid: int) -> Activity:
+        """See `activity`."""
+        ...
+
 
 def scratch_names(pids: Iterable[int]) -> int:
     """Count the files and folders in the fullest scratch folder of some processes.
@@ -87,8 +91,14 @@ NS_PER_TICK = NS_PER_S // os.sysconf("SC_CLK_TCK")
 #: State in /proc/PID/stat of a process that was stopped by a signal.
 HALTED = b"T"
 #: Memory in /proc/PID/status, in KiB, that is not backed by a file.
-OWN_MEMORY = (b"\nRssAnon:", b"\nRssShmem:", b"\nVmSwap:")
+SHARED_MEMORY = b"\nRssShmem:"
+OWN_MEMORY = (b"\nRssAnon:", SHARED_MEMORY, b"\nVmSwap:")
 THREADS = b"\nThreads:"
+#: In /proc/PID/task/TID/status: the state of a thread, the one of those that run or are ready to, and how often it has
+#: given up its processor; see proc_pid_status(5).
+STATE, RUNNING, SLEPT = b"\nState:\t", b"R", b"\nvoluntary_ctxt_switches:"
+#: How often a process has called the system to read and to write, in /proc/PID/io.
+READS, WRITES = b"\nsyscr:", b"\nsyscw:"
 #: Indexes of fields in /proc/PID/stat after the name in parentheses, which may contain spaces. Index 0 is the third
 #: field of proc(5), which counts from 1.
 PARENT, USER_TIME, CHILDREN_SYSTEM_TIME = 1, 11, 14
@@ -192,6 +202,44 @@ def thread_starved_ns(pid: int, thread: int | str) -> int:
 def busiest_thread_ns(pids: Iterable[int]) -> int:
     """Return the processor time of the thread of processes that has used most; 0 if the kernel does not count it."""
     return max((_schedule(pid, thread)[0] for pid in pids for thread in _names(f"/proc/{pid}/task")), default=0)
+
+
+@dataclass(frozen=True, slots=True)
+class Activity:
+    """What a process has done so far other than computing.
+
+    Attributes:
+        runs: Whether one of its threads runs, or is ready to.
+        slept: How often its threads have waited for something else than a processor.
+        exchanged: How often it has read or written; None if the kernel does not tell, or if it shares memory with
+            others, in which it can be told and tell something without that.
+    """
+
+    runs: bool = False
+    slept: int = 0
+    exchanged: int | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the process has computed all the time from one look to another if both are equal to this."""
+        return self.runs and self.exchanged is not None
+
+
+def activity(pid: int) -> Activity:
+    """Return what a process has done so far; one that has ended has done nothing."""
+    runs, slept = False, 0
+    for thread in _names(f"/proc/{pid}/task"):
+        status = _read(f"/proc/{pid}/task/{thread}/status")
+        runs = runs or status.partition(STATE)[2][:1] == RUNNING
+        slept += _number(status, SLEPT)
+    return Activity(runs, slept, _exchanged(pid) if runs else None)
+
+
+def _exchanged(pid: int) -> int | None:
+    counted = _read(f"/proc/{pid}/io")
+    if READS not in counted or _number(_read(f"/proc/{pid}/status"), SHARED_MEMORY):
+        return None
+    return _number(counted, READS) + _number(counted, WRITES)
 
 
 def _schedule(pid: int, thread: int | str) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from grader.runtime.model.quantities import MIB, NS_PER_S
-from grader.runtime.usage import families, last_pid, peak_bytes, restart_peak, threads_starved_ns, usage
+from grader.runtime.usage import activity, families, last_pid, peak_bytes, restart_peak, threads_starved_ns, usage
 
 WAIT = "import sys; sys.stdout.write('x'); sys.stdout.flush(); sys.stdin.read()"
 
@@ -117,3 +117,38 @@ def test_the_peak_of_one_task_is_not_that_of_the_next() -> None:
     del held
     restart_peak()
     assert peak_bytes() < most - 90 * MIB
+
+
+def test_a_process_that_only_computes_has_done_nothing_else() -> None:
+    """A loop without end: neither has it slept, nor read, nor written, since it told that it begins."""
+    argv = [sys.executable, "-I", "-S", "-c", "import os; os.write(1, b'x')\nwhile True: pass"]
+    with subprocess.Popen(argv, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.read(1)
+        before = activity(process.pid)
+        used_ns = usage([process.pid]).processor_ns
+        while usage([process.pid]).processor_ns < used_ns + NS_PER_S // 10:
+            time.sleep(0.01)
+        after = activity(process.pid)
+        process.kill()
+    assert after.is_known
+    assert (after.runs, after.exchanged) == (True, before.exchanged)
+
+
+def test_a_process_that_waits_for_input_has_slept(run: Callable[[str], subprocess.Popen[bytes]]) -> None:
+    """What it has done since nobody knows: another may have woken it in between."""
+    process = run("")
+    while activity(process.pid).runs:
+        os.sched_yield()
+    assert activity(process.pid).slept > 0
+    assert not activity(process.pid).is_known
+
+
+def test_who_shares_memory_may_tell_something_at_any_time() -> None:
+    """Without sleeping, reading or writing."""
+    code = "import mmap, os\nshared = mmap.mmap(-1, 4096)\nshared[0] = 1\nos.write(1, b'x')\nwhile True: pass"
+    with subprocess.Popen([sys.executable, "-I", "-S", "-c", code], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.read(1)
+        assert not activity(process.pid).is_known
+        process.kill()

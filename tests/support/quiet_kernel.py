@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from grader.runtime.usage import Usage
+from grader.runtime.usage import Activity, Usage
 
 
 class QuietKernel:
@@ -14,12 +14,14 @@ class QuietKernel:
         told: What processes use, by their pids; the others use nothing.
         starved_ns: How long each thread of any process has waited for a processor.
         busiest_ns: The processor time of the busiest thread of any process; None if there is only one.
+        activities: What processes have done, by their pids; the others have done nothing.
     """
 
     def __init__(self) -> None:
         self.told: dict[int, Usage] = {}
         self.starved_ns: dict[str, int] = {}
         self.busiest_ns: int | None = None
+        self.activities: dict[int, Activity] = {}
 
     def scratch_names(self, pids: Iterable[int]) -> int:
         """Return that no files were made."""
@@ -55,3 +57,7 @@ class QuietKernel:
         """Return that a thread of this process has never waited."""
         del pid, thread
         return 0
+
+    def activity(self, pid: int) -> Activity:
+        """Return what a process has done."""
+        return self.activities.get(pid, Activity())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 
 from grader.grading.submissions.collected import Collected
@@ -170,6 +171,8 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
     package = package_of(folder)
     workspace = workspace_of(package)
     notes: tuple[str, ...] = tuple(_ignored(targets, package, workspace))
+    if (modules := _outermost(folder)) is not None and (whole := _stage_modules(targets, modules, into)) is not None:
+        return whole
     for place, root in enumerate(dict.fromkeys((workspace, package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()
@@ -197,6 +200,45 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
     if len(targets) == 1:
         return replace(stage_submission(str(files[0]), names, alone), notes=notes)
     return replace(_stage_apart(targets, alone), notes=notes)
+
+
+def _outermost(folder: Path) -> Path | None:
+    """Return the outermost Python package that a folder is in; None if it is in none, or in a ROS package."""
+    if is_package(package_of(folder)):
+        return None
+    within = takewhile(lambda up: (up / "__init__.py").is_file(), (folder, *folder.parents))
+    return next(iter([*within][::-1]), None)
+
+
+def _stage_modules(targets: Sequence[Target], package: Path, into: Path) -> Submission | None:
+    """Stage a Python package as a folder of its name, from which its modules import each other; None if it cannot be.
+
+    Args:
+        targets: Programs in it.
+        package: The outermost one.
+        into: The folder to stage in.
+    """
+    staged = into / "modules"
+    staged.mkdir()
+    try:
+        files = [(f"{package.name}/{name}", text) for name, text in every_file(str(package), staged).files]
+        return _stage_files(targets, files, package.parent, staged)
+    except SubmissionError:
+        return None
+
+
+def _stage_files(
+    targets: Sequence[Target], files: Sequence[tuple[str, bytes]], root: Path, into: Path
+) -> Submission | None:
+    """Stage files of a folder, among them those of the programs; None if they are too large, or one is left out."""
+    meant = {
+        target.name: target.file.resolve().relative_to(root).as_posix() for target in targets if target.file is not None
+    }
+    if len(files) > MAX_FILES or sum(len(text) for _, text in files) > MAX_TOTAL_BYTES:
+        return None
+    names = [target.name for target in targets]
+    submission = stage_collected(Collected(tuple(files)), str(root), names, into, meant)
+    return submission if all(submission.files[name].found == path for name, path in meant.items()) else None
 
 
 def _ignored(targets: Sequence[Target], package: Path, workspace: Path) -> Iterator[str]:
@@ -227,19 +269,10 @@ def _stage_needed(targets: Sequence[Target], package: Path, workspace: Path, int
             # Packages in one another are read with the outer one.
             if not any(other in folder.parents for other in packages):
                 files += [(f"{inside}/{name}", text) for name, text in every_file(str(folder), into).files]
-        meant = {
-            target.name: target.file.resolve().relative_to(workspace).as_posix()
-            for target in targets
-            if target.file is not None
-        }
-        if len(files) > MAX_FILES or sum(len(text) for _, text in files) > MAX_TOTAL_BYTES:
-            return None
-        submission = stage_collected(
-            Collected(tuple(files)), str(workspace), [one.name for one in targets], into, meant
-        )
+        submission = _stage_files(targets, files, workspace, into)
     except SubmissionError:
         return None
-    if any(submission.files[name].found != path for name, path in meant.items()):
+    if submission is None:
         return None
     taken = ", ".join(name_of(folder) for folder in packages)
     return replace(submission, notes=(f"the workspace is too large to be copied: taken are the packages {taken}",))

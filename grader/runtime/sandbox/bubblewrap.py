@@ -29,6 +29,7 @@ from grader.runtime.sandbox.exposure import (
 )
 from grader.runtime.sandbox.properties import install_command
 from grader.runtime.sandbox.protocol import (
+    INSTALLED,
     Command,
     Placeholder,
     PreparedSandbox,
@@ -251,8 +252,12 @@ class Bubblewrap:
         # Scratch folders first: a mount on /tmp would hide anything that was bound below it before.
         for scratch in ("/dev/shm", "/tmp"):  # noqa: S108
             options += ["--perms", "1777", "--size", size, "--tmpfs", scratch]
-        for folder in (HOME, HOME / "log", WORK):
+        installed = (HOME / INSTALLED,) if process.installed else ()
+        for folder in (HOME, HOME / "log", WORK, *installed):
             options += ["--perms", "0777", "--dir", str(folder)]
+        # A folder with the shared files: whoever goes up from it is still in the process's own folders.
+        if process.installed:
+            options += ["--symlink", str(process.installed / "share"), str(HOME / INSTALLED / "share")]
         host_at = process.host_at or HOST
         needed = (host_at, *(() if process.host_at else (PLACEHOLDER,))) if process.host_folder else ()
         for folder in (*view.parents(), *parents_of(needed)):

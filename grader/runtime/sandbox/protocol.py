@@ -11,6 +11,9 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import KIB
 from grader.runtime.ros_installation import PythonRuntime
 
+#: The folder in the home of a process with what packages install, for launch files and those whom they start.
+INSTALLED = "installed"
+
 
 @dataclass(frozen=True, slots=True)
 class StudentProcess:
@@ -36,6 +39,9 @@ class StudentProcess:
     # Where the process sees `host_folder` in tiers with a view of files for each; None for the usual place
     host_at: Path | None = None
     own: str = ""  # part of the name of its own folder, in tiers without a view of files for each process
+    # The prefix that is also found below `INSTALLED` in its home, where a launch file was told that it is; None for a
+    # process that no launch file has started. Tiers without a view of files for each process have it nowhere else.
+    installed: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, NS_PER_S, size
 from grader.runtime.model.trace import ClockKind, Trace
 from grader.runtime.usage import FULL_BYTES, FULL_CODE, Kernel, Usage, processor_words
+from grader.runtime.worker.computing import ComputingProcesses
 from grader.runtime.worker.socket_memory import MANY_DESCRIPTORS, KernelMemory, SocketMemory, descriptors
 from grader.runtime.worker.student_process import NodeProcess
 
@@ -47,8 +48,8 @@ UNREAD_BYTES = 224 * MIB
 #: If real time runs out after the nodes spent more than STARVED_SHARE of it waiting for a processor, the machine was
 #: too busy; but not if the nodes themselves used more than OWN_SHARE of all processor time.
 STARVED_SHARE, OWN_SHARE = 0.25, 0.5
-#: Threads and children that together use more than the busiest thread, and more of all processors than this, may be why
-#: the nodes have to wait. The threads of the middleware use a tenth of that.
+#: Threads and children that together use more than the busiest thread, and more of all processors than this, while the
+#: nodes do not wait for one, may be why they have to. The threads of the middleware use a tenth of that.
 OTHERS_SHARE = 0.05
 
 
@@ -97,6 +98,7 @@ class ResourceMonitor:
         self._limits = limits
         self._budget = budget
         self._families: dict[int, set[int]] = {}
+        self._computing = ComputingProcesses(kernel)
         self._sockets = sockets
         self._held: dict[int, KernelMemory] = {}
         self._last_pid = ""
@@ -128,11 +130,13 @@ class ResourceMonitor:
             self._look_for_waiting()
             most_ns = 0 if self.fills_machine else self._most_starved_ns
             own_ns = self._own_waiting_ns() - self._own_waited_ns
+            # On a busy machine the same work takes a smaller share of the time.
+            own_time_ns = self.real_ns - min(self._waited_ns, self.real_ns)
             trace = replace(
                 trace,
                 most_starved_ns=most_ns,
                 all_starved_ns=self.starved_ns + max(0, own_ns) if most_ns else 0,
-                suspected=self._others_ns > max(self._busiest_ns, OTHERS_SHARE * self._processors * self.real_ns),
+                suspected=self._others_ns > max(self._busiest_ns, OTHERS_SHARE * self._processors * own_time_ns),
             )
         return replace(trace, harness_problem=trace.harness_problem or self.problem)
 
@@ -255,16 +259,16 @@ class ResourceMonitor:
     def _look_for_waiting(self) -> None:
         pids = [pid for family in self._families.values() for pid in family]
         self._used_ns = max(self._used_ns, self._kernel.usage(pids).processor_ns)
+        look = self._computing.look(pids, time.monotonic_ns())
         # For each program alone: the first threads of several programs are not the second thread of one.
-        families = self._families.values()
         used = [
-            (self._kernel.usage(family).processor_ns, self._kernel.busiest_thread_ns(family)) for family in families
+            (self._kernel.usage(family).processor_ns, self._kernel.busiest_thread_ns(family.difference(look.computing)))
+            for family in self._families.values()
         ]
         self._busiest_ns = max(self._busiest_ns, max((most_ns for _, most_ns in used), default=0))
         self._others_ns = max(self._others_ns, sum(max(0, whole_ns - most_ns) for whole_ns, most_ns in used))
-        waited_ns = self._kernel.threads_starved_ns(pids).values()
-        self._waited_ns = max(self._waited_ns, sum(waited_ns))
-        self._most_starved_ns = max(self._most_starved_ns, max(waited_ns, default=0))
+        self._waited_ns = max(self._waited_ns, sum(look.waited_ns))
+        self._most_starved_ns = max(self._most_starved_ns, max(look.waited_ns, default=0))
 
     def _look_for_names(self) -> None:
         for student in self._students:

@@ -22,7 +22,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import size
 from grader.runtime.model.trace import Fault, FaultKind, LogRecord, OutputLine, Start, WrittenFile
-from grader.runtime.sandbox.protocol import Command
+from grader.runtime.sandbox.protocol import INSTALLED, Command
 from grader.runtime.sandbox.starter import StartedProcess
 from grader.runtime.worker.console import TEXT_CHARACTERS
 from grader.runtime.worker.core import Process
@@ -395,7 +395,8 @@ class NodeProcess(Process):
         """
         if self.keeps_paths:
             return text
-        text = text.replace(f"{self.prefix}/", "") if self.prefix else text
+        if self.prefix:
+            text = text.replace(f"{self.prefix}/", "").replace(self.prefix, f"{OWN_FOLDER}/home/{INSTALLED}")
         text = text.replace(f"{self.root}/", "")
         if not self.own_folder:
             return text

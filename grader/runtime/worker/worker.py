@@ -317,6 +317,7 @@ class Worker:
             },
             pass_fds=(theirs.fileno(),),
             working=plan.working or None,
+            installed=_installed(plan, name),
         )
         process = process if told or plan.working else with_copies(process, file, plan.limits)
         root = self._isolation.submission_of(process)
@@ -387,6 +388,7 @@ class Worker:
             arguments=(),
             environment={"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(map(str, searched))},
             pass_fds=(),
+            installed=_installed(plan, name),
         )
         process = with_copies(process, file, plan.limits)
         root = self._isolation.submission_of(process)
@@ -430,6 +432,12 @@ def with_copies(process: StudentProcess, file: str, limits: Limits) -> StudentPr
 def _own_folder(environment: Mapping[str, str]) -> str:
     """Return the folder that an environment names for temporary files; empty if there is none."""
     return environment.get("TMPDIR", "")
+
+
+def _installed(plan: Plan, name: str) -> Path | None:
+    """Return the prefix of the packages for a process that a launch file started, and may have told where it is."""
+    started = bool(plan.start_of(name).launched_by and plan.prefixes)
+    return Path(plan.prefixes[0]) if started else None
 
 
 def _with_packages(runtime: PythonRuntime, plan: Plan) -> PythonRuntime:

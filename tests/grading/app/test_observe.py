@@ -14,6 +14,7 @@ from tiers import each, more
 from grader.grading.app import observe as observing
 from grader.grading.app.inputs import read_simulations
 from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.programs import find_targets, stage
 from grader.grading.judging.summary import summarise
 from grader.grading.model.report import Summary
 from grader.grading.reporting.observed import render_summary, summary_to_json, without_libraries
@@ -35,6 +36,7 @@ from grader.runtime.model.trace import (
     ServiceEnd,
     Trace,
 )
+from grader.runtime.sandbox.bubblewrap import ROOT_NAME, USER_NAME
 from grader.runtime.session import Job
 
 FLOAT = "std_msgs/msg/Float32"
@@ -295,6 +297,76 @@ def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: s
     )
     summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
     assert [r.text for r in summary.records] == ["from the other package"]
+
+
+def test_a_module_is_staged_with_the_folder_of_its_package(tmp_path: Path) -> None:
+    """A Python package without package.xml: what is told names the folder, and modules above are found."""
+    for folder in ("talk", "talk/core"):
+        (tmp_path / "more" / folder).mkdir(parents=True)
+        (tmp_path / "more" / folder / "__init__.py").touch()
+    file = tmp_path / "more" / "talk" / "core" / "say.py"
+    file.write_text("from ..words import WORD\n")
+    (tmp_path / "more" / "talk" / "words.py").write_text("WORD = 1\n")
+    (tmp_path / "more" / "beside.py").touch()
+    submission = stage(find_targets((file,)).targets, tmp_path)
+    assert submission.files["say.py"].found == "talk/core/say.py"
+    names = {path.relative_to(submission.root).as_posix() for path in Path(submission.root).rglob("*.py")}
+    assert names == {"talk/__init__.py", "talk/words.py", "talk/core/__init__.py", "talk/core/say.py"}
+
+
+@pytest.mark.ros
+def test_an_import_from_above_a_package_is_told_with_its_folder(tmp_path: Path) -> None:
+    """Of a file `__init__.py` there are many."""
+    (tmp_path / "talk").mkdir()
+    (tmp_path / "talk" / "__init__.py").write_text("from ..words import WORD\n")
+    (tmp_path / "talk" / "say.py").touch()
+    (fault,) = observe(ObserveRequest((tmp_path / "talk" / "say.py",), NS_PER_S, clock="virtual"), quiet).faults
+    assert (fault.file, fault.line) == ("talk/__init__.py", 1)
+    assert fault.text.startswith("ImportError: attempted relative import beyond top-level package")
+
+
+LOOKS = """import os, sys
+import rclpy
+from rclpy.utilities import remove_ros_args
+def main():
+    rclpy.init()
+    node = rclpy.create_node("looks")
+    words = node.declare_parameter("words", "").value
+    for place in (*remove_ros_args(sys.argv)[1:], words):
+        node.get_logger().info(str(os.path.exists(place)))
+    with open(os.path.join(sys.argv[1], "..", "..", "log.csv"), "w") as file:
+        node.get_logger().info(f"wrote {file.write('one')} beside")
+"""
+FINDS = """import os
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+from launch import LaunchDescription
+from launch.substitutions import PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackagePrefix, FindPackageShare
+
+def generate_launch_description():
+    share = get_package_share_directory("finds")
+    return LaunchDescription([Node(package="finds", executable="looks", arguments=[
+        get_package_prefix("finds"),
+        os.path.join(get_package_prefix("finds"), "..", ".."),
+        PathJoinSubstitution([FindPackagePrefix("finds"), "share", "finds"]),
+        PathJoinSubstitution([FindPackageShare("finds"), "package.xml"]),
+        os.path.join(share, "nothing"),
+    ], parameters=[{"words": os.path.join(share, "package.xml")}])])
+"""
+
+
+@pytest.mark.ros
+def test_a_node_finds_the_folders_that_its_launch_file_has_found(tmp_path: Path) -> None:
+    """They are given to it as arguments and parameters; the workspace above them can be written to, as after colcon."""
+    a_package(tmp_path, "finds", looks=LOOKS)
+    setup = tmp_path / "finds" / "setup.py"
+    setup.write_text(setup.read_text().replace("setup(", 'setup(data_files=[("share/finds", ["package.xml"])], ', 1))
+    (tmp_path / "finds" / "finds.launch.py").write_text(FINDS)
+    summary = observe(ObserveRequest((tmp_path / "finds" / "finds.launch.py",), NS_PER_S, clock="virtual"), quiet)
+    if summary.isolation not in (ROOT_NAME, USER_NAME):
+        pytest.skip("processes have no view of files of their own here")
+    assert [r.text for r in summary.records] == [*["True"] * 4, "False", "True", "wrote 3 beside"]
 
 
 SAYS = """import rclpy

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -16,7 +16,7 @@ from quiet_kernel import QuietKernel
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, NS_PER_S
 from grader.runtime.model.trace import ClockKind, Trace
-from grader.runtime.usage import Usage
+from grader.runtime.usage import Activity, Usage
 from grader.runtime.worker import resource_monitor as module
 from grader.runtime.worker.resource_monitor import Budget, ResourceMonitor
 from grader.runtime.worker.socket_memory import SocketMemory
@@ -144,6 +144,50 @@ def test_a_node_whose_children_compute_is_a_suspect(main_s: int, others_s: int, 
     found = guard.reviewed(replace(TRACE, clock=ClockKind.WALL))
     assert (found.suspected, guard.fills_machine) == (suspected, fills)
     assert found.most_starved_ns == (0 if fills else 50 * NS_PER_S)
+
+
+class FamilyKernel(QuietKernel):
+    """Knows a node and its child, and what each of them does."""
+
+    node, child = 4_000_000, 4_000_001
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.waited_ns = {self.node: 0, self.child: 0}
+        self.busiest = {self.node: 0, self.child: 0}
+
+    def families(self, roots: Collection[int]) -> dict[int, set[int]]:
+        return {root: {self.node, self.child} for root in roots}
+
+    def threads_starved_ns(self, pids: Iterable[int]) -> dict[str, int]:
+        return {str(pid): self.waited_ns.get(pid, 0) for pid in pids}
+
+    def busiest_thread_ns(self, pids: Iterable[int]) -> int:
+        return max(self.busiest[pid] for pid in pids)
+
+
+@pytest.mark.parametrize(
+    ("exchanges", "waited_s", "suspected"),
+    [(0, 10, True), (1, 95, False)],
+    ids=["that only computes", "that tells it what it has computed"],
+)
+def test_a_node_waits_for_a_processor_not_for_its_child(
+    monkeypatch: pytest.MonkeyPatch, exchanges: int, waited_s: int, suspected: bool
+) -> None:
+    """On a busy machine a child that computes without end has waited most, and delays nothing that the node sends."""
+    kernel, now_ns, processors = FamilyKernel(), [0], len(os.sched_getaffinity(0))
+    monkeypatch.setattr(time, "monotonic_ns", lambda: now_ns[0])
+    student = Watched(kernel.node)
+    guard = guarding(kernel, student)
+    for second in range(1, 101):
+        now_ns[0] = second * NS_PER_S
+        kernel.told[kernel.node] = Usage(processor_ns=second * processors * NS_PER_S // 10)
+        kernel.busiest = {kernel.node: 0, kernel.child: second * processors * NS_PER_S // 10}
+        kernel.waited_ns = {kernel.node: second * NS_PER_S // 10, kernel.child: second * NS_PER_S * 95 // 100}
+        kernel.activities[kernel.child] = Activity(runs=True, slept=0, exchanged=second * exchanges)
+        guard.poll(module.SEARCH_EVERY)
+    found = guard.reviewed(replace(TRACE, clock=ClockKind.WALL))
+    assert (found.most_starved_ns, found.suspected) == (waited_s * NS_PER_S, suspected)
 
 
 def test_a_budget_that_is_used_up_ends_the_nodes() -> None:

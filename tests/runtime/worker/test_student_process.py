@@ -520,3 +520,12 @@ def test_a_closed_stream_is_no_end(start: Callable[[str], NodeProcess]) -> None:
     student.tell({})
     assert student.report() == {"kind": "idle"}
     assert json.dumps(student.notes) == "[]"
+
+
+def test_the_prefix_of_packages_reads_the_same_in_each_run() -> None:
+    """Its folder has another name each time; as a launch file it is told of the one in the home."""
+    student = silent()
+    student.prefix = "/tmp/grade-run-4711/installed"
+    student._streams["stdout"] += b"/tmp/grade-run-4711/installed: /tmp/grade-run-4711/installed/share/a\n"
+    (line,) = student.output(7, final=True)
+    assert line.text == "/tmp/home/installed: share/a"
