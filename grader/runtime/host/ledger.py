@@ -15,7 +15,6 @@ from typing import Any
 
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-from rclpy.node import Node
 from rclpy.qos import (
     DeadlineBestAvailable,
     DurabilityPolicy,
@@ -28,6 +27,7 @@ from rclpy.qos import (
 from . import originals
 from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
 from .events import Events
+from .node_parts import context_of, declared_by, ends_of, full_name_of, handle_of, name_of, seen_by
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -53,8 +53,6 @@ DISCOVERED_NS = 200_000_000
 SHUTDOWN_S = 1.0
 #: Checks whether a context is valid, without counting as a look, which would let time pass.
 _CONTEXT_OK = Context.ok
-#: Look up the endpoints of a topic; like this, it is not a look of the program.
-_LOOKS = {"publisher": Node.get_publishers_info_by_topic, "subscription": Node.get_subscriptions_info_by_topic}
 
 
 #: The kinds of endpoints of topics.
@@ -170,8 +168,8 @@ class Ledger:
 
     def resolve(self, node: Any, kind: str, endpoint: Any) -> None:
         """Look up the QoS of a new publisher or subscription of a node that asked for what is best."""
-        known = _LOOKS[kind](node, endpoint.topic_name)
-        mine = [one for one in known if (one.node_name, one.node_namespace) == (node.get_name(), node.get_namespace())]
+        known = seen_by(node, kind, endpoint.topic_name)
+        mine = [one for one in known if (one.node_name, one.node_namespace) == name_of(node)]
         if mine:  # the middleware numbers the endpoints of a process
             newest = max(mine, key=lambda one: one.endpoint_gid[12:15])
             self._resolved[endpoint] = newest.qos_profile
@@ -268,7 +266,7 @@ class Ledger:
         claims: list[dict[str, Any]] = []
         existing = self.nodes()
         seen = [node for node in existing if is_in(domain, node)]
-        elsewhere = [end.handle for node in existing if node not in seen for end in _ends(node)]
+        elsewhere = [end.handle for node in existing if node not in seen for end in ends_of(node)]
         self._elsewhere = set(map(id, elsewhere))
         for handle in elsewhere:
             self.events.leave_alone(handle)
@@ -298,7 +296,7 @@ class Ledger:
             if (kind == "client" or not _is_background(endpoint)) and not self.is_elsewhere(endpoint.handle)
         ]
         claims += [claim for end in self._actions for claim in end.claims()]
-        nodes = [node.get_fully_qualified_name() for node in seen]
+        nodes = [full_name_of(node) for node in seen]
         claims += [{"kind": "node", "name": name, "type": ""} for name in nodes]
         claims += [
             {**_ORDINARY, "kind": "publisher", "name": topic, "type": TRANSITION_EVENT}
@@ -314,12 +312,12 @@ class Ledger:
     def nodes(self) -> list[Any]:
         """Return the nodes that still exist, oldest first."""
         alive = (reference() for reference in self._nodes)
-        return [node for node in alive if node is not None and _valid(node)]
+        return [node for node in alive if node is not None and _is_valid(handle_of(node))]
 
     def add_node(self, node: Any) -> None:
         """Register a new node and its context."""
         self._nodes.append(weakref.ref(node, self._collected))
-        self.contexts.append(weakref.ref(node.context))
+        self.contexts.append(weakref.ref(context_of(node)))
         self.changed = True
 
     def expect(self, arrivals: dict[str, int]) -> None:
@@ -534,18 +532,19 @@ class Ledger:
         node = self._node()
         if node is None:
             return None
-        with node.handle:
+        handle = handle_of(node)
+        with handle:
             found = Counter(
-                f"node {space.rstrip('/')}/{name}" for name, space in node.handle.get_node_names_and_namespaces()
+                f"node {space.rstrip('/')}/{name}" for name, space in handle.get_node_names_and_namespaces()
             )
-            for topic, _ in _rclpy.rclpy_get_topic_names_and_types(node.handle, False):  # noqa: FBT003 - C++
+            for topic, _ in _rclpy.rclpy_get_topic_names_and_types(handle, False):  # noqa: FBT003 - C++
                 if topic not in BACKGROUND:
-                    found[f"publisher {topic}"] = node.handle.get_count_publishers(topic)
-                    found[f"subscription {topic}"] = node.handle.get_count_subscribers(topic)
-            for service, types in _rclpy.rclpy_get_service_names_and_types(node.handle):
+                    found[f"publisher {topic}"] = handle.get_count_publishers(topic)
+                    found[f"subscription {topic}"] = handle.get_count_subscribers(topic)
+            for service, types in _rclpy.rclpy_get_service_names_and_types(handle):
                 if not types[0].startswith(BACKGROUND_SERVICES):
-                    found[f"service {service}"] = node.handle.get_count_services(service)
-                    found[f"client {service}"] = node.handle.get_count_clients(service)
+                    found[f"service {service}"] = handle.get_count_services(service)
+                    found[f"client {service}"] = handle.get_count_clients(service)
         return {name: [count] for name, count in found.items() if count}
 
     def _clients_of(self, service: str) -> int | None:
@@ -561,12 +560,13 @@ class Ledger:
         node = self._node()
         if node is None:
             return None
-        with node.handle:
-            return ask(node.handle)
+        handle = handle_of(node)
+        with handle:
+            return ask(handle)
 
     def _node(self) -> Any:
         """Return the newest node that can query the graph, or None."""
-        return next((node for node in reversed(self.nodes()) if _CONTEXT_OK(node.context)), None)
+        return next((node for node in reversed(self.nodes()) if _CONTEXT_OK(context_of(node))), None)
 
     def _receivers(self, channel: str) -> list[Any]:
         actions = [r for end in self._actions for r in end.receivers.values() if r.channel == channel]
@@ -586,17 +586,17 @@ def _is_background(endpoint: Any) -> bool:
 def is_in(domain: int, node: Any) -> bool:
     """Return whether a node is in a ROS domain; True if it is being destroyed, or its context was shut down."""
     with contextlib.suppress(Exception):
-        return bool(node.context.get_domain_id() == domain)
+        return bool(context_of(node).get_domain_id() == domain)
     return True
 
 
-def _ends(node: Any) -> list[Any]:
-    return [*node.publishers, *node.subscriptions, *node.clients, *node.services]
-
-
 def _valid(endpoint: Any) -> bool:
+    return _is_valid(endpoint.handle)
+
+
+def _is_valid(handle: Any) -> bool:
     try:
-        with endpoint.handle:
+        with handle:
             return True
     except _rclpy.InvalidHandle:
         return False
@@ -604,10 +604,10 @@ def _valid(endpoint: Any) -> bool:
 
 def parameters_of(node: Any) -> list[dict[str, str]]:
     """Return the parameters that a node has declared, without those that every node has."""
-    own = node.get_fully_qualified_name()
+    own = full_name_of(node)
     return [
         {"kind": "parameter", "name": f"{own}:{name}", "type": repr(parameter.value)[:200]}
-        for name, parameter in sorted([*getattr(node, "_parameters", {}).items()])
+        for name, parameter in sorted(declared_by(node).items())
         if name not in BACKGROUND_PARAMETERS
     ]
 

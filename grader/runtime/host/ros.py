@@ -40,6 +40,7 @@ from rclpy.time import Time
 from .actions import Counted, install_actions
 from .clock import VirtualClock
 from .ledger import BACKGROUND, ENDS_OF_TOPICS, REAL_WAIT_SET, Ledger, asks_for_best, finite_ns, service_name
+from .node_parts import context_of, full_name_of
 from .order import ReadyOrder
 from .scheduler import Scheduler
 
@@ -815,10 +816,10 @@ def note_other_domains(domain: Callable[[], int], tell: Callable[[dict[str, Any]
 
     def note(node: Any) -> None:
         with contextlib.suppress(Exception):  # its context may be shut down
-            found = node.context.get_domain_id()
+            found = context_of(node).get_domain_id()
             if found != domain() and found not in told:
                 told.add(found)
-                tell({"code": "other_domain", "node": node.get_fully_qualified_name(), "domain": found})
+                tell({"code": "other_domain", "node": full_name_of(node), "domain": found})
 
     ON_NODES.append(note)
 

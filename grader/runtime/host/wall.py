@@ -207,9 +207,10 @@ class WallTime:
         """Report the parameters of all nodes, if any is new."""
         from . import ros
         from .ledger import is_in, parameters_of
+        from .node_parts import declared_by
 
         nodes = [node for one in ros.MADE_NODES if (node := one()) is not None and is_in(self.domain, node)]
-        now = tuple(id(one) for node in nodes for one in [*getattr(node, "_parameters", {}).values()])
+        now = tuple(id(one) for node in nodes for one in declared_by(node).values())
         if now == self._reported:
             return
         self._reported = now
@@ -271,13 +272,14 @@ def _is_watched(node: Any, publisher: Any) -> bool:
     Without a node to ask, or for a publisher that has been destroyed, return whether it is matched, or cannot be.
     """
     from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-    from rclpy.node import Node
+
+    from .node_parts import seen_by
 
     try:
         with publisher.handle:
             if not publisher.handle.get_subscription_count():  # unlike the program's own question, this does not wait
                 return False
-        known = Node.get_subscriptions_info_by_topic(node, publisher.topic_name) if node is not None else []
+        known = seen_by(node, "subscription", publisher.topic_name) if node is not None else []
     except (_rclpy.InvalidHandle, _rclpy.RCLError):
         return True
     return node is None or any(one.node_name.startswith(OBSERVER) for one in known)
@@ -285,7 +287,9 @@ def _is_watched(node: Any, publisher: Any) -> bool:
 
 def _owner_of(publisher: Any, made: list[weakref.ref[Any]]) -> Any:
     """Return the node of a publisher; None if that cannot be determined."""
+    from .node_parts import publishers_of
+
     with contextlib.suppress(Exception):  # a node may be being destroyed
         nodes = [node for reference in made if (node := reference()) is not None]
-        return next(node for node in nodes if any(publisher is own for own in node.publishers))
+        return next(node for node in nodes if any(publisher is own for own in publishers_of(node)))
     return None

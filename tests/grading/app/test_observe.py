@@ -325,6 +325,47 @@ def test_an_import_from_above_a_package_is_told_with_its_folder(tmp_path: Path) 
     assert fault.text.startswith("ImportError: attempted relative import beyond top-level package")
 
 
+HIDES = """import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Float32
+from std_srvs.srv import Trigger
+
+class Battery(Node):
+    def __init__(self):
+        super().__init__("battery")
+        self.declare_parameter("charge", 85.0)
+        self.out = self.create_publisher(Float32, "charge", 10)
+        self.heard = self.create_subscription(Float32, "charge", self.hear, 10)
+        self.served = self.create_service(Trigger, "ask", self.tell)
+        self.out.publish(Float32(data=self.get_parameter("charge").value))
+        self._parameters, self._publishers = ["mine"], {"mine": 1}
+
+    def hear(self, msg):
+        self.get_logger().info(f"heard {msg.data}")
+
+    def tell(self, request, response):
+        return response
+
+    def context(self): return "mine"
+    publishers = get_name = get_namespace = get_fully_qualified_name = context
+
+if __name__ == "__main__":
+    rclpy.init()
+    rclpy.spin(Battery())
+"""
+
+
+@pytest.mark.breadth(1, 1)
+@pytest.mark.ros
+@pytest.mark.parametrize("clock", ["virtual", "wall"])
+def test_a_class_may_hide_what_rclpy_does_not_need(tmp_path: Path, clock: str) -> None:
+    """It works in plain Python, so the host must not need the hidden names either."""
+    (tmp_path / "battery.py").write_text(HIDES)
+    summary = observe(ObserveRequest((tmp_path / "battery.py",), NS_PER_S, clock=clock), quiet)
+    assert (summary.faults, [r.text for r in summary.records]) == ((), ["heard 85.0"])
+    assert summary.nodes == ("/battery",)
+
+
 LOOKS = """import os, sys
 import rclpy
 from rclpy.utilities import remove_ros_args

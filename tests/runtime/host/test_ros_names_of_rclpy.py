@@ -56,6 +56,12 @@ ASSIGNED = {
     "event_handlers": "rclpy.publisher:Publisher",
     "event_type": "rclpy.event_handler:EventHandler",
     "_parameters": "rclpy.node:Node",
+    "_context": "rclpy.node:Node",
+    "_publishers": "rclpy.node:Node",
+    "_subscriptions": "rclpy.node:Node",
+    "_clients": "rclpy.node:Node",
+    "_services": "rclpy.node:Node",
+    "__node": "rclpy.node:Node",
     "_guard": "rclpy.executors:Executor",
     "_tasks": "rclpy.executors:Executor",
 }
@@ -69,6 +75,7 @@ CPP = {
             "WaitSet",
             "get_current_signal_handlers_options",
             "rclpy_get_service_names_and_types",
+            "rclpy_get_publishers_info_by_topic",
             "rclpy_get_subscriptions_info_by_topic",
         ),
         *(

@@ -249,12 +249,14 @@ def _starts_with_none(source: Source, store: ast.AST) -> bool:
     return isinstance(value, ast.Constant) and value.value is None
 
 
-@crash_rule("", FaultKind.EXCEPTION, FaultKind.EXITED, priority=4035)
+@crash_rule(
+    "^TypeError: 'method' object"
+    "|^AttributeError: '(?:function|method)' object has no attribute '(?:handle|add_entity|wake)'",
+    priority=4035,
+)
 def _method_over_property(crash: Crash) -> Clue | None:
     """A method has the name of a property of Node, which rclpy reads."""
     source = crash.source
-    if crash.fault.kind is FaultKind.EXCEPTION and not crash.said("^TypeError: 'method' object"):
-        return None
     for owner in source.deriving("Node"):
         for function in (f for f in owner.body if isinstance(f, Function)):
             if function.name in NODE_PROPERTIES and not function.decorator_list:
