@@ -458,7 +458,8 @@ def _slips(source: Source, value: ast.expr, wanted: Curve) -> Iterator[tuple[ast
     for node in inside:
         if number_in_code(source, node) is not None and not isinstance(node, ast.BinOp):
             yield from ((node, right) for right in numbers)
-        elif isinstance(node, ast.Call) and len(node.args) == 1:
+    for node in inside:
+        if isinstance(node, ast.Call) and len(node.args) == 1:
             for right in numbers:
                 yield node.args[0], ast.BinOp(left=node.args[0], op=ast.Mult(), right=right)
 

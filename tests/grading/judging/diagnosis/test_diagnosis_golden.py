@@ -250,6 +250,39 @@ NEAR_MISSES: list[tuple[str, list[tuple[str, str]], str, dict[str, Any], str]] =
         {"rate": 10},
         "waits_to_spin",
     ),
+    # the time between two messages is computed of each one, and the log waits for no time
+    (
+        "odom_subscriber.py",
+        [
+            ("        self.msg = None\n", "        self.msg = None\n        self.last = time.time()\n"),
+            (
+                "        self.msg = msg\n",
+                "        now = time.time()\n        passed = now - self.last\n        self.last = now\n"
+                "        if passed > 0:\n            self.get_logger().info(f'{msg.pose.pose.position.x} {passed}')\n",
+            ),
+        ],
+        "logging_once",
+        {},
+        "time_moves_always",
+    ),
+    # one of the numbers in the formula is 0, and the counter counts
+    (
+        "simple_publisher.py",
+        [
+            ("m.data = math.sin(self.i * 0.1)", "phase = 0\n        m.data = math.sin(self.i * 0.1 + phase)"),
+        ],
+        "swinging",
+        {"what": "zero"},
+        "counter_never_changes",
+    ),
+    # what is stored elsewhere is read, and the counter counts
+    (
+        "simple_publisher.py",
+        [("        self.i += 1\n", "        following = self.i + 1\n        self.i = following\n")],
+        "swinging",
+        {"what": "small_step"},
+        "changed_in_a_copy",
+    ),
     ("battery_service_client.py", [*_BLOCKS, _THREAD], "asking_once", {}, "future_never_done"),
     ("battery_service_client.py", [*_BLOCKS, _THREAD], "asking_once", {}, "result_too_early"),
     (
@@ -360,6 +393,7 @@ TEXTUAL = {rule.id for rule in EVERY} - {
     "loop_pace",
     "stopped_itself",
     "too_slow",
+    "value_line",  # where the value is computed
     "wrong_axis",
     "wrong_level",
     "wrong_number",
@@ -390,6 +424,9 @@ OTHERWISE = [
     ("fan_controller.py", "answering", {"rule": "only_on"}),
     ("fan_controller.py", "latching", {}),
     ("fan_controller.py", "mute", {}),
+    ("simple_publisher.py", "swinging", {"what": "zero"}),
+    ("simple_publisher.py", "swinging", {"what": "small_step"}),
+    ("simple_publisher.py", "swinging", {"logs": "first_ten"}),
     ("battery_service_client.py", "asking_once", {}),
 ]
 
