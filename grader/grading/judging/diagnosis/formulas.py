@@ -173,16 +173,18 @@ def _needless_pi(case: Case) -> Clue | None:
 
 @hint_rule("field_function", priority=10135)
 def _counts_by_another_step(case: Case) -> Clue | None:
-    """The counter grows by another number than 1."""
-    source = case.source
+    """The counter grows by another number than the one that makes the formula of what is computed."""
+    source, wanted, value = case.source, curve(str(case.check.formula)), _computing(case)[1]
+    numbers = [float(str(n.value)) for n in ast.walk(wanted.tree) if isinstance(n, ast.Constant)]
     for counter in _counters(case):
+        right = [n for n in (1.0, *numbers) if value is not None and _same(source, value, counter, wanted, n)]
         for store in source.stored.get(counter, ()):
             statement = source.parents.get(store)
             step = number_in_code(source, statement.value) if isinstance(statement, ast.AugAssign) else None
             adds = isinstance(statement, ast.AugAssign) and isinstance(statement.op, ast.Add)
-            if statement is not None and adds and step not in (None, 1.0) and "n" in str(case.check.formula):
-                hint = f"{source.code(statement)} counts {number(step or 0.0)} for each message: write {counter} += 1"
-                return Clue(hint, source.place(statement))
+            if statement is not None and adds and right and step is not None and step not in (1.0, *right):
+                hint = f"{source.code(statement)} counts {number(step)} for each message: write {counter} += "
+                return Clue(f"{hint}{number(right[0])}", source.place(statement))
     return None
 
 
@@ -380,11 +382,12 @@ def _formula_nearly(case: Case) -> Clue | None:
     if value is None or "t" in wanted.names or len(names) != 1 or len(list(ast.walk(value))) > _LONGEST_FORMULA:
         return None
     counter = names.pop()
-    if _same(source, value, counter, wanted):
+    step = _step(source, counter)
+    if _same(source, value, counter, wanted, step):
         return None
     for old, new in _slips(source, value, wanted):
         better = _exchanged_in(value, old, new)
-        if not _same(source, better, counter, wanted):
+        if not _same(source, better, counter, wanted, step):
             continue
         worth = constant(source, old)
         if isinstance(old, (ast.Name, ast.Attribute)) and worth is not None and isinstance(new, ast.Constant):
@@ -406,6 +409,13 @@ def _computing(case: Case) -> tuple[ast.AST, ast.expr | None]:
     return (places[0] if places else ast.Pass()), value if isinstance(value, ast.expr) else None
 
 
+def _step(source: Source, counter: str) -> float:
+    """Return by how much a counter grows; 1 if the text does not show it."""
+    statements = [source.parents.get(n) for n in source.stored.get(counter, ())]
+    steps = [number_in_code(source, s.value) for s in statements if isinstance(s, ast.AugAssign)]
+    return steps[0] if len(steps) == 1 and steps[0] is not None else 1.0
+
+
 def _is_variable(source: Source, node: ast.AST) -> bool:
     """Return whether a node is a whole name that is neither called nor a known number."""
     outer = source.parents.get(node)
@@ -413,13 +423,13 @@ def _is_variable(source: Source, node: ast.AST) -> bool:
     return isinstance(node, (ast.Name, ast.Attribute)) and not part and number_in_code(source, node) is None
 
 
-def _same(source: Source, value: ast.expr, counter: str, wanted: Curve) -> bool:
-    """Return whether an expression of a counter gives the same values as a formula of n."""
+def _same(source: Source, value: ast.expr, counter: str, wanted: Curve, step: float = 1.0) -> bool:
+    """Return whether an expression of a counter that grows by this step gives the same values as a formula of n."""
     try:
         own = curve(_as_formula(source, value, counter))
     except FormulaError:
         return False
-    return all(math.isclose(own.at(n), wanted.at(n), rel_tol=1e-6, abs_tol=1e-9) for n in range(_COMPARED))
+    return all(math.isclose(own.at(n * step), wanted.at(n), rel_tol=1e-6, abs_tol=1e-9) for n in range(_COMPARED))
 
 
 def _as_formula(source: Source, node: ast.expr, counter: str) -> str:
