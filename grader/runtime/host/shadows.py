@@ -54,6 +54,7 @@ ROS_PARTS = (
     "rclpy.impl.rcutils_logger",
     "rclpy.logging",
     "rclpy.node",
+    "rclpy.parameter",
     "rclpy.publisher",
     "rclpy.qos",
     "rclpy.service",
@@ -62,6 +63,7 @@ ROS_PARTS = (
     "rclpy.time",
     "rclpy.time_source",
     "rclpy.timer",
+    "rclpy.topic_endpoint_info",
     "rclpy.utilities",
 )
 
