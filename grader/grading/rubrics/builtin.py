@@ -22,7 +22,7 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 
 
 def builtin_recording() -> Path:
-    """Return the recording that the stimulus `recorded` plays if it names none: a minute of a robot's odometry."""
+    """Return the recording that the stimulus `recorded` plays without `bag`: a minute of a robot's odometry."""
     rubrics = shipped("rubrics")
     return next(rubrics.glob("*/odometry"), rubrics / "odometry")
 

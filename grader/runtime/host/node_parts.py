@@ -20,7 +20,7 @@ from rclpy.utilities import get_default_context
 
 #: The attribute of a node that holds its ends of each kind.
 _ENDS = {"_publishers": Publisher, "_subscriptions": Subscription, "_clients": Client, "_services": Service}
-#: What tells of the publishers and subscriptions of a topic in the graph; this is no look of the program.
+#: What tells of the publishers and subscriptions of a topic in the graph, without counting as a look of the program.
 _LOOKS = {
     "publisher": _rclpy.rclpy_get_publishers_info_by_topic,
     "subscription": _rclpy.rclpy_get_subscriptions_info_by_topic,

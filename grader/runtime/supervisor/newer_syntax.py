@@ -80,7 +80,7 @@ class _Older(cst.CSTTransformer):
             ast.parse(f"({cst.Module([]).code_for_node(node)}\n)")
         except (SyntaxError, ValueError):
             self.changed = True
-            # no target of an assignment, no pattern and no docstring: an f-string is none either
+            # like an f-string, this can be neither the target of an assignment, nor a pattern, nor a docstring
             text, brackets = cst.SimpleString("''"), ([*node.lpar, cst.LeftParen()], [cst.RightParen(), *node.rpar])
             return cst.BooleanOperation(text, cst.And(), text, *brackets)
         return updated

@@ -16,8 +16,8 @@ COMPUTES_NS = NS_PER_S
 class ComputedWork(NamedTuple):
     """What was found: the processes that compute, and how long threads have waited for a processor.
 
-    While a process neither sleeps nor reads nor writes, it tells nobody anything, and its threads wait for nobody's
-    sake. So only what they have waited before is in `waited_ns`.
+    While a process neither sleeps nor reads nor writes, nothing that others see depends on it, and how long its threads
+    wait delays no message. So only what they have waited before is in `waited_ns`.
     """
 
     computing: Collection[int]

@@ -433,7 +433,7 @@ def _same(source: Source, value: ast.expr, counter: str, wanted: Curve, step: fl
 
 
 def _as_formula(source: Source, node: ast.expr, counter: str) -> str:
-    """Return an expression as a formula of n; one that is none has `?` in it."""
+    """Return an expression as a formula of n, with `?` for what cannot be part of one."""
     worth = number_in_code(source, node)
     if worth is not None:
         return f"({worth!r})" if math.isfinite(worth) else "?"
