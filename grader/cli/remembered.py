@@ -112,7 +112,7 @@ class RepeatingCommand(click.Command):
         """Raise ClassError if the last run used a file that is no longer there."""
         from grader.runtime.model.errors import ClassError
 
-        gone = [path for text in texts if self._is_path(name) and not os.path.lexists(path := _place(name, text))]
+        gone = [path for text in texts if self._is_path(name) and not os.path.lexists(path := _split(name, text)[1])]
         if gone:
             option = _name(self._kept[name])
             holds = f" ({_decisions(last.decisions)})" if name == "adjustments" else ""
@@ -161,11 +161,6 @@ def _split(name: str, text: str) -> tuple[str, str]:
     """Split what was typed for an option in front of its path: a recording has a topic there, `/scan=bags/scan`."""
     topic, equals, path = text.partition("=") if name == _BAGS else ("", "", text)
     return topic + equals, path
-
-
-def _place(name: str, text: str) -> str:
-    """Return the path in what was typed for an option."""
-    return _split(name, text)[1]
 
 
 def _with_path(name: str, text: str, changed: Callable[[str], str]) -> str:

@@ -18,8 +18,7 @@ from typing import Any
 
 import pytest
 
-from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription, not_met
-from grader.grading.model.exercise import Finding
+from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription
 from grader.grading.model.wording import listed, nearest
 from grader.runtime.message_classes import built, message_class
 from grader.runtime.model.author_files import line_of, words_of
@@ -170,16 +169,16 @@ class GradedWorld(World):
     @property
     def advice(self) -> str:
         """One thing to do about messages of the test that do not arrive: the submission has to hear them."""
-        return next((found.hint for found in self._unheard() if found.hint), "")
+        return next(filter(None, self._advices()), "")
 
-    def _unheard(self) -> Iterator[Finding]:
+    def _advices(self) -> Iterator[str]:
         for offer in self._offers.values():
             same = [e for e in self._graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
             fitting = [e for e in same if e.type == offer.type]
             if not fitting:
-                yield explain_no_subscription(self.trace(), offer.topic, offer.type)
+                yield explain_no_subscription(self.trace(), offer.topic, offer.type).hint
             for unmet in filter(None, (unmet_policy(offer, end) for end in fitting)):
-                yield not_met(f"{offer.topic}: no message arrives", hint=f"subscribe to {offer.topic} with {unmet[0]}")
+                yield f"subscribe to {offer.topic} with {unmet[0]}"
 
     def _silence(self, topic: str) -> NoMessage:
         found = explain_no_message(self.trace(), topic, None)

@@ -128,12 +128,9 @@ class Sides(NamedTuple):
 
 def sides_of(simulation: Simulation) -> Sides:
     """Return what a simulation does; its publishers are reliable and volatile."""
-    published = simulation.publishes().items()
-    ends = [
-        Endpoint("publisher", topic, kind, "the simulation", -1, "reliable", "transient_local")
-        for topic, kind in published
-    ]
-    return Sides(ends, simulation.hears(), simulation.serves(), "the simulation")
+    who, published = "the simulation", simulation.publishes().items()
+    ends = [Endpoint("publisher", topic, kind, who, -1, "reliable", "volatile") for topic, kind in published]
+    return Sides(ends, simulation.hears(), simulation.serves(), who)
 
 
 def mismatches(graph: GraphSnapshot, sides: Iterable[Sides]) -> Iterator[str]:

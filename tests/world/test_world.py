@@ -395,6 +395,19 @@ def start_both(ros: World) -> None:
     ros.run("nodes/switch.py")
 
 
+def test_a_simulation_keeps_no_message_for_who_comes_later(ros: World, write: Write) -> None:
+    """A subscription that asks for kept messages never gets one of it."""
+    text = (
+        "import rclpy\nfrom rclpy.qos import QoSProfile, DurabilityPolicy\nfrom std_msgs.msg import Int32\n"
+        "rclpy.init()\nnode = rclpy.create_node('late')\n"
+        "qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)\n"
+        "node.create_subscription(Int32, '/in', print, qos)\nrclpy.spin(node)\n"
+    )
+    ros.run(write(text))
+    with pytest.raises(WrongType, match="/in: /late asks for transient_local, the simulation offers volatile"):
+        ros.simulate(Other(publishes={"/in": INT}))
+
+
 def test_one_subscription_that_fits_is_enough(ros: World, write: Write) -> None:
     """Another node may use the name with another type."""
     ros.run("nodes/echo.py")

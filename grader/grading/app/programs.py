@@ -172,7 +172,7 @@ def stage(targets: Sequence[Target], into: Path) -> Submission:
     workspace = workspace_of(package)
     notes: tuple[str, ...] = tuple(_ignored(targets, package, workspace))
     if (modules := _outermost(folder)) is not None and (whole := _stage_modules(targets, modules, into)) is not None:
-        return whole
+        return replace(whole, notes=(*notes, *whole.notes))
     for place, root in enumerate(dict.fromkeys((workspace, package, folder))):
         staged = into / f"submission_{place}"
         staged.mkdir()

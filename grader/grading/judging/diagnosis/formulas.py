@@ -20,6 +20,7 @@ from grader.grading.judging.diagnosis.wiring import (
     runs,
     set_at_first_only,
     sole_assignment,
+    stored_elsewhere,
 )
 from grader.grading.judging.facts import SeriesFacts
 from grader.grading.judging.series import Curve, FormulaError, curve
@@ -220,8 +221,7 @@ def _changed_in_a_copy(case: Case) -> Clue | None:
             if is_read(source, target):
                 hint = f"{kept} never changes: add {kept} = {target} below this line"
             else:
-                local = f"local to {source.function_name(statement)}" if "." not in target else "not read"
-                hint = f"{target} is {local}, so {kept} never changes: write {kept} = {source.code(value, 40)}"
+                hint = stored_elsewhere(source, statement, kept, source.code(value, 40))
             return Clue(hint, source.place(statement), key="sequence")
     return None
 

@@ -26,6 +26,7 @@ from grader.grading.judging.diagnosis.wiring import (
     roots,
     runs,
     set_at_first_only,
+    stored_elsewhere,
     switches,
     target_of,
     time_since,
@@ -384,9 +385,7 @@ def _time_stands_still(case: Case) -> Clue | None:
         for statement in (s for s in source.all(ast.Assign) if source.function_of(s) is source.function_of(call)):
             target = chain(statement.targets[0])
             if source.code(statement.value, 40) == now and target and not is_read(source, target):
-                local = f"local to {source.function_name(statement)}" if "." not in target else "not read"
-                hint = f"{target} is {local}, so {last} never changes: write {last} = {now}"
-                return Clue(hint, source.place(statement), key="log_pace")
+                return Clue(stored_elsewhere(source, statement, last, now), source.place(statement), key="log_pace")
         around = call in set(subtree(test))
         stays, where = ("true", "under it") if around else ("false", "below it")
         hint = f"{last} never changes, so '{source.code(test.test, 40)}' stays {stays}: add {last} = {now} {where}"

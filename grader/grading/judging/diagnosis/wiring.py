@@ -679,6 +679,13 @@ def _of_the_file(source: Source, place: ast.AST) -> bool:
     return source.function_of(place) is None and source.class_of(place) is None
 
 
+def stored_elsewhere(source: Source, statement: ast.Assign, kept: str, value: str) -> str:
+    """Return the hint about a value that goes to a variable that nobody reads, in place of the one that is kept."""
+    target = chain(statement.targets[0])
+    lost = "not read" if "." in target else f"local to {source.function_name(statement)}"
+    return f"{target} is {lost}, so {kept} never changes: write {kept} = {value}"
+
+
 def is_read(source: Source, dotted: str) -> bool:
     """Return whether the value of a name or an attribute is used anywhere in the file."""
     return any(isinstance(n.ctx, ast.Load) and chain(n) == dotted for n in source.names())
