@@ -12,9 +12,11 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from grader.grading.judging.diagnosis import hint_for, placed_in
+from grader.grading.judging.diagnosis.silence import taken_from_executor
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package
 from grader.grading.judging.judge_run import same_names, started, unheard, unserved
-from grader.grading.judging.values import as_number
+from grader.grading.judging.source import read
+from grader.grading.judging.values import as_number, published, student_endpoints
 from grader.grading.model.report import Pace, Summary, TopicSummary
 from grader.runtime.model.extras import pip_install
 from grader.runtime.model.quantities import NS_PER_S, seconds
@@ -50,7 +52,8 @@ def summarise(
     graphs = trace.graphs()
     caught = _caught(trace)
     faults = (*trace.faults(), *caught)
-    seen = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served), *_stateless(trace))
+    told = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served), *_stateless(trace))
+    seen = (*told, *_taken(trace, sources))
     notes = (*seen, *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(
@@ -104,6 +107,16 @@ def _stateless(trace: Trace) -> Iterator[str]:
         # each exception is followed by a goal without a state
         if kinds.count(True) > kinds.count(False):
             yield f"{process}: an action ends without goal_handle.succeed(), so its goal counts as aborted"
+
+
+def _taken(trace: Trace, sources: Mapping[str, str]) -> Iterator[str]:
+    """Yield a note for each node that is taken from its executor, where a topic is without messages."""
+    if all(published(trace, end.topic) for end in student_endpoints(trace, "publisher")):
+        return
+    for file, text in sources.items():
+        clue = taken_from_executor(read(file, text))
+        if clue is not None and clue.location is not None:
+            yield f"{file}:{clue.location.line}: {clue.hint}"
 
 
 def _is_of_action(record: LogRecord, text: str) -> bool:

@@ -108,7 +108,7 @@ class EvaluatedLaunch:
         notes: Sentences about what it left out and does not matter.
         fault: Why nothing can be started; None if something can.
         harness_problem: Why that is not the launch file's fault; empty if it is.
-        written: What it has written, if nothing can be started.
+        written: What it has written while it was evaluated.
     """
 
     processes: tuple[tuple[str, str], ...] = ()
@@ -126,10 +126,12 @@ class EvaluatedLaunch:
 def evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
     """Wait until a process has evaluated a launch file, and return what it describes."""
     made = _evaluated(student, plan)
-    if made.fault is None and made.processes:
-        return made
     student.drain()
-    return replace(made, written=tuple(student.output(0, final=True)))
+    written = tuple(student.output(0, final=True))
+    if made.processes:
+        # A node may go by the name of the launch file: what the launch file prints is nothing that the node logs.
+        written = tuple(replace(one, process=f"{one.process} (evaluation)") for one in written)
+    return replace(made, written=written)
 
 
 def _evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
@@ -359,8 +361,7 @@ def expanded(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Plan:
 def unstarted(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Trace:
     """Return the trace of a scenario with a launch file from which nothing can be started."""
     faults = tuple(made.fault for made in launched.values() if made.fault is not None)
-    written = tuple(one for made in launched.values() for one in made.written)
-    trace = Trace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=(*written, *faults))
+    trace = Trace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=faults)
     return renamed(trace, launched)
 
 
@@ -370,9 +371,10 @@ def renamed(trace: Trace, launched: Mapping[str, EvaluatedLaunch]) -> Trace:
     left_out = tuple(one for made in launched.values() for one in made.left_out)
     unstarted = tuple(one for made in launched.values() for one in made.unstarted)
     notes = tuple(one for made in launched.values() for one in made.notes)
+    written = tuple(one for made in launched.values() for one in made.written)
     return replace(
         trace,
-        observations=tuple(_renamed(one, labels) for one in trace.observations),
+        observations=(*written, *(_renamed(one, labels) for one in trace.observations)),
         starts=tuple(replace(start, process=labels.get(start.process, start.process)) for start in trace.starts),
         notes=(*left_out, *(text for text, _ in unstarted), *notes, *trace.notes),
         left_out=left_out,

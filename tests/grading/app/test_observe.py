@@ -613,17 +613,22 @@ def test_what_only_looks_like_an_exception_in_an_action_is_none() -> None:
 
 
 @pytest.mark.ros
-def test_what_a_launch_file_prints_is_shown_with_its_error(tmp_path: Path) -> None:
-    """Whoever prints to find a mistake sees it, also in a line without an end."""
+@pytest.mark.parametrize("fails", [True, False], ids=["fails", "starts a node"])
+def test_what_a_launch_file_prints_is_shown(tmp_path: Path, *, fails: bool) -> None:
+    """Whoever prints to find a mistake sees it, also in a line without an end; it is nothing that the node printed."""
     text = f"print('at the top')\n{NEEDS}".replace(
         "def generate_launch_description():\n",
-        "def generate_launch_description():\n    print('here', end='')\n    1 / 0\n",
+        f"def generate_launch_description():\n    print('here', end='')\n    1 / {0 if fails else 1}\n",
     )
+    (tmp_path / "waits.py").write_text(WAITS)
     (tmp_path / "needs.launch.py").write_text(text)
-    request = ObserveRequest((tmp_path / "needs.launch.py",), NS_PER_S, clock="virtual")
+    arguments = () if fails else (("kind", "five"),)
+    request = ObserveRequest((tmp_path / "needs.launch.py",), NS_PER_S, clock="virtual", launch_arguments=arguments)
     summary = observe(request, quiet)
-    assert [line.text for line in summary.lines] == ["at the top", "here"]
-    assert "ZeroDivisionError" in summary.faults[0].text
+    assert [(line.process, line.text) for line in summary.lines] == [
+        (f"needs.launch.py{'' if fails else ' (evaluation)'}", text) for text in ("at the top", "here")
+    ]
+    assert ["ZeroDivisionError" in fault.text for fault in summary.faults] == [True] * fails
 
 
 @pytest.mark.breadth(1, 1)
@@ -745,6 +750,87 @@ def test_a_fault_has_the_hint_of_the_report(tmp_path: Path, clock: str) -> None:
     assert 'File "node.py", line 14, in tick' in "".join(shown)
     assert any("calls in Python and ROS)" in line for line in shown)
     assert not any("site-packages" in line or "and 1" in line for line in shown)
+
+
+SPUN_BY_HAND = TALKER.replace(
+    "rclpy.spin(Talker())",
+    """
+node = Talker()
+{executor} = rclpy.executors.SingleThreadedExecutor()
+{executor}.add_node(node)
+rclpy.spin_once(node, timeout_sec=0.01)
+{executor}.spin()
+""",
+).replace("import rclpy\n", "import rclpy\nimport rclpy.executors\n")
+
+
+@pytest.mark.ros
+def test_why_an_executor_spins_nothing_is_told(tmp_path: Path) -> None:
+    """Without a rubric nobody says that messages are missing, but a topic without any and this line are enough."""
+    text = SPUN_BY_HAND.format(sent="String()", given="", executor="mine")
+    summary = seen(tmp_path, node=text)
+    line = 1 + text.splitlines().index("rclpy.spin_once(node, timeout_sec=0.01)")
+    assert [topic.messages for topic in summary.topics] == [0]
+    assert summary.notes == (
+        f"node.py:{line}: rclpy.spin_once(node, timeout_sec=0.01) takes node from mine, which then has nothing to "
+        "spin: write mine.spin_once(...)",
+    )
+
+
+THREADS = """
+import threading
+import rclpy
+from rclpy.node import Node
+
+rclpy.init()
+for name in ("one", "two"):
+    node = Node(name)
+    node.create_timer(0.1, lambda: None)
+    threading.Thread(target=rclpy.spin, args=(node,)).start()
+"""
+SYNCHRONISED = """
+import message_filters
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Header
+from sensor_msgs.msg import Image
+
+
+class Both(Node):
+    def __init__(self):
+        super().__init__("both")
+        ends = [message_filters.Subscriber(self, Image, name) for name in ("left", "right")]
+        self.together = message_filters.TimeSynchronizer(ends, 5)
+        self.together.registerCallback(self.arrived)
+        self.pubs = [self.create_publisher(Image, name, 10) for name in ("left", "right")]
+        self.create_timer(0.2, self.send)
+
+    def send(self):
+        for pub in self.pubs:
+            pub.publish(Image(header=Header(frame_id="camera")))
+
+    def arrived(self):
+        self.get_logger().info("both")
+
+
+rclpy.init()
+rclpy.spin(Both())
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (THREADS, "    threading.Thread(target=rclpy.spin, args=(node,)).start()"),
+        (SYNCHRONISED, "    def arrived(self):"),
+    ],
+    ids=["two threads spin", "a filter's callback"],
+)
+def test_a_hint_names_its_line_where_the_fault_names_another(tmp_path: Path, text: str, line: str) -> None:
+    """An exception in rclpy names the line that spins, or none, and its cause lies elsewhere."""
+    (hint,) = filter(None, seen(tmp_path, node=text).hints)
+    assert hint.startswith(f"node.py:{1 + text.splitlines().index(line)}: ")
 
 
 @pytest.mark.breadth(1, 1)

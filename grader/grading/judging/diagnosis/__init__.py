@@ -176,6 +176,8 @@ def _mistake(rule: Rule, error: Exception) -> AuthorMistake:
 def hint_for(fault: Fault, trace: Trace, text: str) -> str:
     """Return one thing to do about a fault without a rubric; empty if no cause is very likely.
 
+    It begins with the line to look at where the fault itself names another line.
+
     Args:
         fault: The fault.
         trace: Its recording.
@@ -187,7 +189,11 @@ def hint_for(fault: Fault, trace: Trace, text: str) -> str:
     criterion = Criterion("fault", "", Fraction(1), trace.scenario, _Fault())
     sources = {fault.process: read(fault.file or fault.process, text)} if text else {}
     found = clue_for(Case(criterion, verdict, trace, sources, fault))
-    return found[1].hint if found is not None else fault_hint(fault)
+    if found is None:
+        return fault_hint(fault)
+    place = found[1].location
+    elsewhere = place is not None and (place.file, place.line) != (fault.file, fault.line)
+    return f"{place.file}:{place.line}: {found[1].hint}" if place and elsewhere else found[1].hint
 
 
 @dataclass(frozen=True, slots=True)

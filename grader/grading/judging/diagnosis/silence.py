@@ -534,7 +534,11 @@ def _stopped_listening(case: Case) -> Clue | None:
 @hint_rule(given=_unseen_or_once, priority=8185)
 def _taken_from_executor(unseen: _Unseen) -> Clue | None:
     """`rclpy.spin_once(node)` takes the node from the executor that it was added to."""
-    source = unseen.source
+    return taken_from_executor(unseen.source)
+
+
+def taken_from_executor(source: Source) -> Clue | None:
+    """Return a clue if rclpy takes a node from the executor that spins, which then does nothing."""
     added = {chain(c.args[0]): c for c in source.calls("add_node") if c.args}
     for call in source.calls("spin_once", "spin_until_future_complete"):
         node = chain(call.args[0]) if call.args and chain(call.func).startswith(("rclpy.", "spin")) else ""
