@@ -7,6 +7,7 @@ import json
 import posixpath
 import random
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import field
 from shlex import quote
 from typing import TypeVar
 
@@ -204,27 +205,39 @@ class Plan:
         return tuple(posixpath.join(project.folder, path) for project in self.projects for path in project.imported)
 
 
-def plan_scenario(  # noqa: PLR0913 - each comes from another stage
-    exercise: str,
-    scenario: Scenario,
-    submission: Submission,
-    *,
-    seed: int,
-    recordings: Mapping[RecordedStream, Recording],
-    clock: str,
-    own_hashes: bool = False,
-) -> Plan:
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What the runs of a submission have in common besides its files.
+
+    Attributes:
+        seed: Determines every drawn value, together with the exercise and the scenario.
+        clock: `virtual` or `wall`.
+        recordings: The recording of each stimulus that plays one.
+        interfaces: Folders of modules of interface packages that are not installed.
+        trusted: Those of them that the submission does not bring.
+        prefixes: The AMENT_PREFIX_PATH of the nodes, as `install_shares` returns it.
+        own_hashes: Whether the hashes of texts in the processes are drawn too, because the order of a set may matter.
+    """
+
+    seed: int
+    clock: str
+    recordings: Mapping[RecordedStream, Recording] = field(default_factory=dict)
+    interfaces: tuple[str, ...] = ()
+    trusted: tuple[str, ...] = ()
+    prefixes: tuple[str, ...] = ()
+    own_hashes: bool = False
+
+
+def plan_scenario(exercise: str, scenario: Scenario, submission: Submission, around: Surroundings) -> Plan:
     """Plan a scenario by drawing every random value in it.
 
     Args:
         exercise: Id of the exercise.
         scenario: The scenario to plan.
         submission: Provides the files; every process of the scenario must have one.
-        seed: Determines every drawn value, together with the exercise and the scenario.
-        recordings: The recording of each stimulus that plays one.
-        clock: `virtual` or `wall`.
-        own_hashes: Whether the hashes of texts in the processes are drawn too, because the order of a set may matter.
+        around: What the run has besides them.
     """
+    seed = around.seed
     purposes = ("stimuli", exercise, scenario.id)
     # each stimulus has its own source of randomness: adding one does not change the others
     drawn = [(s, random.Random(derive(seed, *purposes, str(n)))) for n, s in enumerate(scenario.stimuli)]  # noqa: S311
@@ -233,7 +246,7 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
     until_ns = 0 if scenario.span.after_first_message_on else duration_ns
     shared = random.Random(derive(seed, *purposes))  # noqa: S311 - as above
     stimuli = tuple(
-        stimulus.planned(Draws(own, shared, until_ns, recordings))
+        stimulus.planned(Draws(own, shared, until_ns, around.recordings))
         for kind in KINDS
         for stimulus, own in drawn
         if type(stimulus) is kind  # or one derived from another kind would be played twice
@@ -246,11 +259,13 @@ def plan_scenario(  # noqa: PLR0913 - each comes from another stage
         duration_ns=duration_ns,
         first_message_on=scenario.span.after_first_message_on or "",
         wait_at_most_ns=scenario.span.wait_at_most_ns,
-        clock=clock,
+        clock=around.clock,
         stimuli=stimuli,
+        interfaces=around.interfaces,
+        prefixes=around.prefixes,
         epoch_ns=EPOCH_NS + _drawn(EPOCH_SPAN_S, seed, "epoch") * NS_PER_S,
         uptime_ns=UPTIME_NS + _drawn(UPTIME_SPAN_S, seed, "uptime") * NS_PER_S,
-        hash_seed=1 + _drawn(_HASH_SEEDS, seed, "hashes", exercise, scenario.id) if own_hashes else 0,
+        hash_seed=1 + _drawn(_HASH_SEEDS, seed, "hashes", exercise, scenario.id) if around.own_hashes else 0,
         limits=scenario.limits,
         starts_ns=tuple((name, drawn_time(t_ns, course)) for name, t_ns in scenario.starts_ns),
         may_exit=scenario.may_exit,

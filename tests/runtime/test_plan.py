@@ -16,7 +16,7 @@ from tracing import ODOMETRY
 from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.runtime.model.scenario import Between, JustAbove, JustBelow, Scenario, Span, Stimulus
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.plan import Plan, derive, plan_scenario
+from grader.runtime.plan import Plan, Surroundings, derive, plan_scenario
 from grader.runtime.recording.codec import from_json, to_json
 from grader.runtime.stimuli.numbers import NumberStream, PlannedNumbers
 from grader.runtime.stimuli.recorded import PlannedRecording, RecordedStream, Recording, TimedMessage
@@ -51,7 +51,7 @@ def plan(
     """Return the plan of a scenario with some stimuli."""
     asked = scenario(*stimuli, name=name, **span)
     recordings = {} if recording is None else {s: recording for s in stimuli if isinstance(s, RecordedStream)}
-    return plan_scenario(exercise, asked, SUBMISSION, seed=seed, recordings=recordings, clock="virtual")
+    return plan_scenario(exercise, asked, SUBMISSION, Surroundings(seed, "virtual", recordings))
 
 
 DRAWN = stream(Between(20.5, 24), Between(0, 10**9), Between(27.25, 30))

@@ -31,7 +31,7 @@ from grader.runtime.model.scenario import (
     cases,
 )
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.plan import Plan, plan_scenario
+from grader.runtime.plan import Plan, Surroundings, plan_scenario
 from grader.runtime.recording.codec import to_json
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.goals import PlannedGoal
@@ -50,7 +50,7 @@ def plan(exercise: str, scenario: Scenario, seed: int) -> Plan:
     files = {name: StudentFile(name, name) for name in scenario.processes}
     submission = Submission("ada", "./ada", Path("/staged"), "sha256:aa", files)
     recordings = {stimulus: DRIVE for stimulus in scenario.stimuli if isinstance(stimulus, RecordedStream)}
-    return plan_scenario(exercise, scenario, submission, seed=seed, recordings=recordings, clock="virtual")
+    return plan_scenario(exercise, scenario, submission, Surroundings(seed, "virtual", recordings))
 
 
 def planned(exercise: str, scenario: str, seed: int) -> Plan:

@@ -27,7 +27,7 @@ from grader.course.mutation.results import (
     result_of,
     unified_change,
 )
-from grader.grading.app.bags import Recordings, read_recordings
+from grader.grading.app.bags import read_recordings
 from grader.grading.app.grade import Progress, plan_jobs, plan_tests, read_exercises
 from grader.grading.app.interfaces import provided_for
 from grader.grading.app.request import GradeRequest
@@ -42,7 +42,8 @@ from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
 from grader.runtime.model.wording import shown
-from grader.runtime.session import Job, RecordingSession, TestJob, open_session
+from grader.runtime.plan import Surroundings
+from grader.runtime.session import Job, RecordingSession, TestJob, open_session, planned_clock
 
 __all__ = [
     "SelftestOptions",
@@ -63,18 +64,16 @@ class TrialRunner:
     workers: int
     request: GradeRequest
     exercise: Exercise
-    bags: Recordings
-    seed: int
+    around: Surroundings  # what the runs of all programs have besides their files
     reference: Submission
     sources: Mapping[str, str]
     progress: Progress
-    interfaces: tuple[Path, ...] = ()  # folders of interface packages that are not installed
     traces: dict[str, Trace] = field(default_factory=dict)
     recordings: int = 0
 
     def grade(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
         """Grade a complete submission; the traces are those of its scenarios."""
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
+        jobs = plan_jobs([self.exercise], submission, self.around)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
         recorded |= self.session.record_tests(self._tests(submission), self.progress)
         self.recordings += len(recorded)
@@ -104,12 +103,12 @@ class TrialRunner:
             done += len(chunk)
 
     def _jobs(self, candidate: Candidate, submission: Submission) -> Mapping[tuple[str, str], Job]:
-        jobs = plan_jobs(self.request, [self.exercise], submission, self.bags, self.seed, self.interfaces)
+        jobs = plan_jobs([self.exercise], submission, self.around)
         concerned = {s.id for s in self.exercise.scenarios if candidate.file in s.processes}
         return {key: job for key, job in jobs.items() if key[1] in concerned}
 
     def _tests(self, submission: Submission) -> Mapping[tuple[str, str], TestJob]:
-        return plan_tests([self.exercise], submission, self.seed, interfaces=self.interfaces, trusted=self.interfaces)
+        return plan_tests([self.exercise], submission, self.around)
 
     def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> TrialResult:
         sources = {**self.sources, candidate.file: candidate.source}
@@ -177,16 +176,17 @@ def _bench(  # noqa: PLR0913  each comes from a different stage
         "", rubrics=(path,), clock=options.clock, isolation=options.isolation, workers=options.jobs, seed=options.seed
     )
     reference = _staged(explained.reference, exercise, session, "reference")
+    seed = PRACTICE.seed(reference.digest) if options.seed is None else options.seed
+    folders = tuple(map(str, provided_for(session, [exercise], (), reference).folders))
+    recordings = read_recordings(request, [exercise])
     return TrialRunner(
         session=session,
         request=request,
         exercise=exercise,
-        bags=read_recordings(request, [exercise]),
-        seed=PRACTICE.seed(reference.digest) if options.seed is None else options.seed,
+        around=Surroundings(seed, planned_clock(request.clock), recordings, folders, trusted=folders),
         reference=reference,
         sources=_sources(reference, exercise),
         progress=progress,
-        interfaces=provided_for(session, [exercise], (), reference).folders,
         workers=options.jobs or 1,
     )
 

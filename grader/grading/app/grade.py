@@ -6,13 +6,13 @@ import platform
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import grader
-from grader.grading.app.bags import Recordings, read_given, read_recordings, recordings_digest, refuse_unplayed
+from grader.grading.app.bags import read_given, read_recordings, recordings_digest, refuse_unplayed
 from grader.grading.app.interfaces import definitions, known_interfaces, provided_for
 from grader.grading.app.request import GradeRequest, reproduction
 from grader.grading.app.seeds import PRACTICE_NOTE
@@ -32,7 +32,7 @@ from grader.runtime.model.releases import TRIED
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
 from grader.runtime.model.wording import listed, shown
-from grader.runtime.plan import derive, known_programs, plan_scenario
+from grader.runtime.plan import Surroundings, derive, known_programs, plan_scenario
 from grader.runtime.session import (
     AUTO,
     NO_ISOLATION,
@@ -98,21 +98,22 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
     `time.perf_counter`; now if it is None.
     """
     started = time.perf_counter() if started is None else started
-    with prepared(session, request, progress, started) as ready:
-        exercises, submission, run = ready.exercises, ready.submission, ready.run
-        asked = {*ready.jobs, *ready.tests}
+    with prepared(session, request, progress, started) as plans:
+        ready, run = plans.ready, plans.run
+        exercises, submission = ready.exercises, ready.submission
+        asked = {*plans.jobs, *plans.tests}
         take = EarlyReports(exercises, asked, run, on_partial_report).take if on_partial_report else None
         checks = SpotChecks(request.spot_checks, run.seed, submission.digest, ready.reaches)
         later = request.clock == AUTO and checks.certain
         first = None if later else take
         budget = RealTimeBudget(request.time_budget_s, spent_s=ready.provided.spent_s)
-        traces = session.record(ready.jobs, request.clock, progress, first, budget=budget)
-        tested = session.record_tests(ready.tests, progress, budget)
+        traces = session.record(plans.jobs, request.clock, progress, first, budget=budget)
+        tested = session.record_tests(plans.tests, progress, budget)
         if request.clock == AUTO:
             # Spot checks are the grader's choice, so they do not count towards the submission's time budget.
             record = partial(_record_checks, session, progress, RealTimeBudget(request.time_budget_s))
             judge_of = partial(_judge_of, exercises, submission, run.sources)
-            traces = check(checks, ready.jobs, traces, record, take or (lambda *_: None), judge_of)
+            traces = check(checks, plans.jobs, traces, record, take or (lambda *_: None), judge_of)
         run = replace(run, traces={**run.traces, **traces, **tested}, duration_s=time.perf_counter() - started)
         run = replace(run, definitions=definitions(run.traces.values(), ready.provided))
         if on_recorded is not None:
@@ -121,15 +122,108 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
-    """A submission that was read and staged, and the recordings to make of it."""
+class Preparation:
+    """A submission that is read and staged, with what each part of the grader has added to its runs so far.
 
+    Attributes:
+        installed: An empty folder for what the submission's packages share.
+        around: What the runs have besides the submission's files.
+        played: Digest of the recordings that are played; empty if there are none.
+        provided: The interface packages that are not installed.
+        kept: The recordings that need not be made again.
+        reaches: What the submission's files use that reaches into their process.
+    """
+
+    session: RecordingSession
+    request: GradeRequest
     exercises: Sequence[Exercise]
     submission: Submission
-    provided: Provided
-    reaches: tuple[str, ...]  # what its files use that reaches into their process
-    jobs: Mapping[Key, Job]  # by exercise and scenario
-    tests: Mapping[Key, TestJob]  # the tests to run, in the same way
+    installed: Path
+    environment: Environment
+    around: Surroundings
+    played: str = ""
+    provided: Provided = Provided()
+    kept: Mapping[Key, Trace] = field(default_factory=dict)
+    reaches: tuple[str, ...] = ()
+
+    @property
+    def unrecorded(self) -> list[Exercise]:
+        """The exercises of which no recordings were kept."""
+        done = {exercise for exercise, _ in self.kept}
+        return [exercise for exercise in self.exercises if exercise.id not in done]
+
+    def noting(self, problems: Sequence[str]) -> Submission:
+        """Return the submission with further notes."""
+        return replace(self.submission, notes=(*self.submission.notes, *problems))
+
+
+def _with_recordings(ready: Preparation) -> Preparation:
+    """Add what the scenarios play."""
+    recordings = read_recordings(ready.request, ready.exercises)
+    played = recordings_digest(read_given(ready.request, recordings))
+    return replace(ready, played=played, around=replace(ready.around, recordings=recordings))
+
+
+def _with_interfaces(ready: Preparation) -> Preparation:
+    """Add the interface packages that are not installed."""
+    budget_s = ready.request.time_budget_s
+    found = provided_for(ready.session, ready.exercises, ready.request.interfaces, ready.submission, budget_s)
+    folders, trusted = tuple(map(str, found.folders)), tuple(map(str, found.trusted))
+    around = replace(ready.around, interfaces=folders, trusted=trusted)
+    return replace(ready, provided=found, submission=ready.noting(found.problems), around=around)
+
+
+def _with_kept(ready: Preparation) -> Preparation:
+    """Add the kept recordings that this run would make again with the same software; none if one is damaged."""
+    if ready.request.recordings is None:
+        return ready
+    # Seldom needed.
+    from grader.grading.app.kept_recordings import PlannedRun, kept_traces, recorded_alike  # noqa: PLC0415
+    from grader.grading.evidence.store import open_evidence  # noqa: PLC0415 - takes long, and is seldom needed
+
+    planned = PlannedRun(ready.submission.digest, ready.around.seed, ready.played, ready.provided.offered)
+    try:
+        evidence = open_evidence(ready.request.recordings)
+        if evidence.manifest.environment != ready.environment:
+            return ready
+        return replace(ready, kept=kept_traces(evidence, recorded_alike(evidence, ready.exercises, planned)))
+    except EvidenceError:
+        return ready
+
+
+def _with_shares(ready: Preparation) -> Preparation:
+    """Add what the submission's packages share, such as launch files and parameter files."""
+    if not ready.unrecorded:
+        return ready
+    submission = ready.submission
+    prefixes, problems = ready.session.install_shares(submission.root, submission.projects, ready.installed)
+    return replace(ready, submission=ready.noting(problems), around=replace(ready.around, prefixes=prefixes))
+
+
+def _with_reaches(ready: Preparation) -> Preparation:
+    """Add what the submission's files use that reaches into their process."""
+    reaches = read_reaches(ready.submission.root, ready.submission.programs)
+    return replace(ready, reaches=reaches, around=replace(ready.around, own_hashes=not HASHES.isdisjoint(reaches)))
+
+
+#: What adds to the runs of a submission, each to what those before it have added: which recordings were kept depends
+#: on what is played and built, and nothing is installed where all are.
+CONTRIBUTORS: tuple[Callable[[Preparation], Preparation], ...] = (
+    _with_recordings,
+    _with_interfaces,
+    _with_kept,
+    _with_shares,
+    _with_reaches,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A prepared submission, and the recordings to make of it, by exercise and scenario."""
+
+    ready: Preparation
+    jobs: Mapping[Key, Job]
+    tests: Mapping[Key, TestJob]
     run: Run  # all but the recordings to make
 
 
@@ -141,51 +235,48 @@ def prepared(
     # What cannot be removed now is removed with the folder of the session.
     with (
         TemporaryDirectory(prefix="submission-", dir=session.folder, ignore_cleanup_errors=True) as folder,
-        TemporaryDirectory(prefix="installed-", dir=session.folder, ignore_cleanup_errors=True) as prefix,
+        TemporaryDirectory(prefix="installed-", dir=session.folder, ignore_cleanup_errors=True) as installed,
     ):
         progress("reading the submission")
-        exercises = read_exercises(request)
-        request = replace(request, exercises=exercise_ids(request.exercises, exercises))
-        root = Path(folder)
-        root.chmod(0o755)  # as the folder of the session
-        if names_a_program(request):
-            exercises, submission = _of_one_file(request, exercises, root)
-        else:
-            submission = _staged(request, exercises, root)
-        if request.every:
-            exercises, submission = begun(exercises, submission)
-        recordings = read_recordings(request, exercises)
-        played = recordings_digest(read_given(request, recordings))
-        seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
-        environment = environment_of(session)
-        provided = provided_for(session, exercises, request.interfaces, submission, request.time_budget_s)
-        submission = replace(submission, notes=(*submission.notes, *provided.problems))
-        kept = _kept(request, exercises, submission, played, seed, environment, provided.offered)
-        done = {exercise for exercise, _ in kept}
-        unrecorded = [exercise for exercise in exercises if exercise.id not in done]
-        prefixes: tuple[str, ...] = ()
-        if unrecorded:
-            prefixes, problems = session.install_shares(submission.root, submission.projects, Path(prefix))
-            submission = replace(submission, notes=(*submission.notes, *problems))
-        reaches = read_reaches(submission.root, submission.programs)
-        folders, own_hashes = provided.folders, not HASHES.isdisjoint(reaches)
-        jobs = plan_jobs(request, unrecorded, submission, recordings, seed, folders, prefixes, own_hashes=own_hashes)
-        tests = plan_tests(
-            unrecorded, submission, seed, folders, prefixes, own_hashes=own_hashes, trusted=provided.trusted
-        )
-        run = Run(
-            submission=submission,
-            traces=kept,
-            sources=read_sources(submission),
-            environment=environment,
-            seed=seed,
-            duration_s=time.perf_counter() - started,
-            notes=(*submission.notes, *_notes(request, session), *provided.notes),
-            reproduce=reproduction(request, exercises, played, seed),
-            interfaces=provided.packages,
-            offered=provided.offered,
-        )
-        yield Prepared(exercises, submission, provided, reaches, jobs, tests, run)
+        ready = _read(session, request, Path(folder), Path(installed))
+        for add_to in CONTRIBUTORS:
+            ready = add_to(ready)
+        jobs = plan_jobs(ready.unrecorded, ready.submission, ready.around)
+        tests = plan_tests(ready.unrecorded, ready.submission, ready.around)
+        yield Prepared(ready, jobs, tests, _run_of(ready, started))
+
+
+def _read(session: RecordingSession, request: GradeRequest, root: Path, installed: Path) -> Preparation:
+    """Read the exercises, and stage the submission in an empty folder."""
+    exercises = read_exercises(request)
+    request = replace(request, exercises=exercise_ids(request.exercises, exercises))
+    root.chmod(0o755)  # as the folder of the session
+    if names_a_program(request):
+        exercises, submission = _of_one_file(request, exercises, root)
+    else:
+        submission = _staged(request, exercises, root)
+    if request.every:
+        exercises, submission = begun(exercises, submission)
+    seed = request.seed_key.seed(submission.digest) if request.seed is None else request.seed
+    around = Surroundings(seed, planned_clock(request.clock))
+    return Preparation(session, request, exercises, submission, installed, environment_of(session), around)
+
+
+def _run_of(ready: Preparation, started: float) -> Run:
+    """Return what is known of a run before its recordings are made."""
+    request, submission, provided = ready.request, ready.submission, ready.provided
+    return Run(
+        submission=submission,
+        traces=ready.kept,
+        sources=read_sources(submission),
+        environment=ready.environment,
+        seed=ready.around.seed,
+        duration_s=time.perf_counter() - started,
+        notes=(*submission.notes, *_notes(request, ready.session), *provided.notes),
+        reproduce=reproduction(request, ready.exercises, ready.played, ready.around.seed),
+        interfaces=provided.packages,
+        offered=provided.offered,
+    )
 
 
 def _judge_of(
@@ -194,32 +285,6 @@ def _judge_of(
     """Return what judges the beginnings of the recordings of a scenario."""
     exercise = next(exercise for exercise in exercises if exercise.id == key[0])
     return BeginningJudge(exercise, key[1], submission, sources)
-
-
-def _kept(  # noqa: PLR0913  all that a recording depends on
-    request: GradeRequest,
-    exercises: Sequence[Exercise],
-    submission: Submission,
-    played: str,
-    seed: int,
-    environment: Environment,
-    interfaces: str,
-) -> Mapping[Key, Trace]:
-    """Return the kept recordings that this run would make again with the same software; none if one is damaged."""
-    if request.recordings is None:
-        return {}
-    # Seldom needed.
-    from grader.grading.app.kept_recordings import PlannedRun, kept_traces, recorded_alike  # noqa: PLC0415
-    from grader.grading.evidence.store import open_evidence  # noqa: PLC0415 - takes long, and is seldom needed
-
-    planned = PlannedRun(submission.digest, seed, played, interfaces)
-    try:
-        evidence = open_evidence(request.recordings)
-        if evidence.manifest.environment != environment:
-            return {}
-        return kept_traces(evidence, recorded_alike(evidence, exercises, planned))
-    except EvidenceError:
-        return {}
 
 
 def _record_checks(
@@ -255,39 +320,12 @@ def read_exercises(
     return [e for e in exercises if request.rubrics or request.every or not e.by_request]
 
 
-def plan_jobs(  # noqa: PLR0913  each comes from a different stage
-    request: GradeRequest,
-    exercises: Sequence[Exercise],
-    submission: Submission,
-    recordings: Recordings,
-    seed: int,
-    interfaces: Sequence[Path] = (),
-    prefixes: tuple[str, ...] = (),
-    *,
-    own_hashes: bool = False,
-) -> dict[tuple[str, str], Job]:
-    """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out.
-
-    The interfaces are the folders of packages that are not installed; the prefixes are what `install_shares` returns.
-    `own_hashes` is whether the order of a set may matter to the programs.
-    """
-    clock = planned_clock(request.clock)
+def plan_jobs(exercises: Sequence[Exercise], submission: Submission, around: Surroundings) -> dict[Key, Job]:
+    """Plan the recordings, by exercise and scenario; scenarios with a missing file are left out."""
     return {
         (exercise.id, scenario.id): Job(
             f"{exercise_name(exercise.number)}: {', '.join(scenario.processes)} ({scenario.id.replace('_', ' ')})",
-            replace(
-                plan_scenario(
-                    exercise.id,
-                    scenario,
-                    submission,
-                    seed=seed,
-                    recordings=recordings,
-                    clock=clock,
-                    own_hashes=own_hashes,
-                ),
-                interfaces=tuple(map(str, interfaces)),
-                prefixes=prefixes,
-            ),
+            plan_scenario(exercise.id, scenario, submission, around),
             programs=submission.programs,
         )
         for exercise in exercises
@@ -296,46 +334,26 @@ def plan_jobs(  # noqa: PLR0913  each comes from a different stage
     }
 
 
-def plan_tests(  # noqa: PLR0913  each comes from a different stage
-    exercises: Sequence[Exercise],
-    submission: Submission,
-    seed: int,
-    interfaces: Sequence[Path] = (),
-    prefixes: tuple[str, ...] = (),
-    *,
-    own_hashes: bool = False,
-    trusted: Sequence[Path] = (),
-) -> dict[Key, TestJob]:
-    """Plan the tests of rubrics, by exercise and scenario; the arguments are those of `plan_jobs`.
-
-    `trusted` are those of the interface packages that the submission does not bring: a test imports no others.
-    """
+def plan_tests(exercises: Sequence[Exercise], submission: Submission, around: Surroundings) -> dict[Key, TestJob]:
+    """Plan the tests of rubrics, by exercise and scenario; a test imports no interfaces that the submission brings."""
+    around = replace(around, clock=planned_clock(AUTO))
     jobs: dict[Key, TestJob] = {}
     for exercise in exercises:
         for scenario in exercise.scenarios:
             if scenario.test is None:
                 continue
-            plan = plan_scenario(
-                exercise.id,
-                scenario,
-                submission,
-                seed=seed,
-                recordings={},
-                clock=planned_clock(AUTO),
-                own_hashes=own_hashes,
-            )
             handed_in = {name: submission.files[name] for name in scenario.processes}
             there = {name: file for name, file in handed_in.items() if file.found}
             jobs[exercise.id, scenario.id] = TestJob(
                 f"{exercise_name(exercise.number)}: {scenario.test.name}",
-                replace(plan, interfaces=tuple(map(str, interfaces)), prefixes=prefixes),
+                plan_scenario(exercise.id, scenario, submission, around),
                 scenario.test,
-                int(derive(seed, "test", exercise.id, scenario.id), 16),
+                int(derive(around.seed, "test", exercise.id, scenario.id), 16),
                 files=tuple((name, file.found or "", file.executable) for name, file in there.items()),
                 missing=tuple(name for name in handed_in if name not in there),
                 known=tuple(known_programs(submission)),
                 provided=scenario.provided,
-                paths=tuple(map(str, trusted)),
+                paths=around.trusted,
             )
     return jobs
 

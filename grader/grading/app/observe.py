@@ -25,7 +25,7 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import RunOptions, Scenario, Span, is_launch_file
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import ClockKind, Trace
-from grader.runtime.plan import plan_scenario
+from grader.runtime.plan import Surroundings, plan_scenario
 from grader.runtime.session import AUTO, VIRTUAL, Job, RecordingSession, open_session, planned_clock
 from grader.runtime.stimuli import RecordedStream
 
@@ -89,12 +89,17 @@ def watch(request: ObserveRequest, progress: Progress, scenario: Scenario | None
     recordings = recordings_of(streams, request.interfaces)
     with open_session(request.isolation, progress=progress) as session:
         submission = stage(targets, session.folder)
-        seed, clock = PRACTICE.seed(submission.digest), planned_clock(request.clock)
-        plan = plan_scenario("observe", scenario, submission, seed=seed, recordings=recordings, clock=clock)
         provided = provide(session, submission, course=request.interfaces, text=types_in([scenario]))
         installed = session.folder / "installed"
         prefixes, _ = session.install_shares(submission.root, submission.projects, installed)
-        plan = replace(plan, interfaces=tuple(map(str, provided.folders)), prefixes=prefixes)
+        around = Surroundings(
+            PRACTICE.seed(submission.digest),
+            planned_clock(request.clock),
+            recordings,
+            tuple(map(str, provided.folders)),
+            prefixes=prefixes,
+        )
+        plan = plan_scenario("observe", scenario, submission, around)
         job = Job("observing", plan, programs=submission.programs)
         trace = session.record({scenario.id: job}, request.clock, progress)[scenario.id]
         if trace.harness_problem and trace.clock is ClockKind.WALL and request.clock == AUTO:

@@ -16,7 +16,7 @@ from grader.grading.rubrics.builtin import builtin_exercises
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.plan import plan_scenario
+from grader.runtime.plan import Surroundings, plan_scenario
 from grader.runtime.stimuli.numbers import PlannedNumbers
 
 ON = known_checks()["threshold_response"]("/temperature", "/fan_speed", 25, 100, 0, "above", unit="°C")
@@ -244,7 +244,7 @@ def test_a_text_is_on_the_wrong_side_of_the_limit_with_every_seed(seed: int) -> 
     submission = Submission("ada", "./ada", Path("/staged"), "sha256:aa", {file: StudentFile(file, file)})
     (exercise,) = (e for e in builtin_exercises() if e.number == "3")
     (asked,) = (s for s in exercise.scenarios if s.id == "controller_alone")
-    planned = plan_scenario(exercise.id, asked, submission, seed=seed, recordings={}, clock="virtual")
+    planned = plan_scenario(exercise.id, asked, submission, Surroundings(seed, "virtual"))
     values = [value for value, _ in planned.of(PlannedNumbers)[0].numbers]
     for text in (str, "{:.0f}".format, "{:.1f}".format, "{:.2f}".format):
         for limit in ("25", "25.0", "25.00"):

@@ -162,7 +162,7 @@ from grader.grading.app.bags import read_recordings
 from grader.grading.app.request import GradeRequest
 from grader.runtime.model.submission import StudentFile, Submission
 from grader.grading.evidence.manifest import scenario_digest
-from grader.runtime.plan import plan_scenario
+from grader.runtime.plan import Surroundings, plan_scenario
 from grader.grading.rubrics.loader import read_rubric
 for path in map(Path, sys.argv[1:]):
     exercise = read_rubric(path)
@@ -170,7 +170,7 @@ for path in map(Path, sys.argv[1:]):
     submission = Submission("x", "x", path.parent / "reference", "sha256:0", files)
     for scenario in exercise.scenarios:
         played = read_recordings(GradeRequest("x"), [exercise])
-        plan = plan_scenario(exercise.id, scenario, submission, seed=7, recordings=played, clock="virtual")
+        plan = plan_scenario(exercise.id, scenario, submission, Surroundings(7, "virtual", played))
         print(scenario_digest(scenario), plan)
 """
 

@@ -10,7 +10,7 @@ from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.scenario import Connection, TimeBetween
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.plan import PlannedConnection, plan_scenario
+from grader.runtime.plan import PlannedConnection, Surroundings, plan_scenario
 
 MS = 1_000_000
 RUBRIC = """\
@@ -44,9 +44,7 @@ def test_delays_and_losses_are_read_and_planned(tmp_path: Path) -> None:
     (scenario,) = read_rubric(path).scenarios
     submission = Submission("x", "x", tmp_path, "", {"follower.py": StudentFile("follower.py", "follower.py")})
     assert scenario.connections == (Connection("/target", TimeBetween(0, 50 * MS), 0.25),)
-    plans = [
-        plan_scenario("follower", scenario, submission, seed=seed, recordings={}, clock="virtual") for seed in (1, 1, 2)
-    ]
+    plans = [plan_scenario("follower", scenario, submission, Surroundings(seed, "virtual")) for seed in (1, 1, 2)]
     first, same, other = (plan.connections for plan in plans)
     assert first == same != other
     assert first == (PlannedConnection("/target", (0, 50 * MS), 0.25, first[0].seed),)

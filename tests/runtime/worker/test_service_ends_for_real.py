@@ -21,7 +21,7 @@ from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.trace import ClockKind, Fault, LogRecord, Mark, Request, Response
-from grader.runtime.plan import plan_scenario
+from grader.runtime.plan import Surroundings, plan_scenario
 from grader.runtime.recording.codec import trace_to_json
 from grader.runtime.stimuli.calls import ServiceCalls
 from grader.runtime.stimuli.goals import ActionGoal
@@ -48,7 +48,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
         (tmp_path / "s").mkdir()
         submission = stage_submission(str(NODES), files, tmp_path / "s")
         asked = Scenario("alone", files, Span(seconds * NS_PER_S), stimuli, **fields)
-        plan = plan_scenario("services", asked, submission, seed=1, recordings={}, clock=clock)
+        plan = plan_scenario("services", asked, submission, Surroundings(1, clock))
         traces = [session.record({"t": Job("t", plan)}, clock, lambda _: None)["t"] for _ in range(times)]
         assert [trace.harness_problem for trace in traces] == [""] * times
         assert len({json.dumps(trace_to_json(trace)) for trace in traces}) == 1
