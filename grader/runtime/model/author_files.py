@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import sys
+import threading
 import traceback
 from types import ModuleType
 
 from grader.runtime.model.dataclass import dataclass
+
+#: Held while a file runs: its module can be found before it is complete, and submissions are graded in several threads.
+_RUNNING = threading.RLock()
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,19 +40,20 @@ def run(prefix: str, path: str, content: bytes) -> ModuleType:
     """
     digest = hashlib.sha256(path.encode("utf-8", "surrogateescape") + b"\0" + content).hexdigest()
     name = f"{prefix}_{digest[:24]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    module = ModuleType(name)
-    module.__file__ = path
-    vars(module)["__content__"] = content
-    code = compile(content, path, "exec", dont_inherit=True)
-    sys.modules[name] = module  # dataclasses look up their module while they are created
-    try:
-        exec(code, vars(module))  # noqa: S102  the instructor chose this file, and it lies where no student writes
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
+    with _RUNNING:
+        if name in sys.modules:
+            return sys.modules[name]
+        module = ModuleType(name)
+        module.__file__ = path
+        vars(module)["__content__"] = content
+        code = compile(content, path, "exec", dont_inherit=True)
+        sys.modules[name] = module  # dataclasses look up their module while they are created
+        try:
+            exec(code, vars(module))  # noqa: S102  the instructor chose this file, and it lies where no student writes
+        except BaseException:
+            del sys.modules[name]
+            raise
+        return module
 
 
 def line_of(error: BaseException, path: str, default: int = 1) -> int:

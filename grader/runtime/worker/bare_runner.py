@@ -24,8 +24,9 @@ FIRST_LOOK_NS = 10_000_000
 
 
 #: The pauses of the loop, longer than with the host: a whole class is checked, and no host waits for an answer. What a
-#: program sends, logs and prints at one moment is taken together, at most 2 ms late, a twentieth of the jitter allowed
-#: on this clock. Arrivals, output and the end of a process end the longest pause; only the graph is found by looking.
+#: program sends and logs counts from its arrival, which the middleware notes; what it prints is found up to 2 ms late,
+#: a twentieth of the jitter allowed on this clock. Arrivals, output and the end of a process end the longest pause: the
+#: graph alone is found by looking.
 PAUSE_OF_BARE_S, LONGEST_PAUSE_OF_BARE_NS = 0.002, 50_000_000
 #: How rarely to look at a graph that does not change: each look costs a millisecond of a processor, half of the loop.
 RAREST_GRAPH_NS = 200_000_000
@@ -43,7 +44,8 @@ class BareRunner(WallRunner):
 
     def __init__(self, plan: Plan, students: list[NodeProcess], observer: Observer) -> None:
         super().__init__(plan, students, observer)
-        self._logs: list[Logged] = []
+        #: Each with the time of its arrival.
+        self._logs: list[tuple[int, Logged]] = []
 
     def _begin(self) -> None:
         """Wait for the first node or message, and start the clock."""
@@ -71,11 +73,24 @@ class BareRunner(WallRunner):
     def _look(self, now_ns: int) -> None:
         super()._look(now_ns)
         remaining = self._plan.limits.lines - len(self._logs)
-        self._logs += self._observer.logs()[: max(0, remaining)]
+        self._logs += self._logged(now_ns)[: max(0, remaining)]
+
+    def _logged(self, now_ns: int) -> list[tuple[int, Logged]]:
+        return [(self._arrived(log.arrived_ns, now_ns), log) for log in self._observer.logs()]
+
+    def _arrived(self, clock_ns: int, now_ns: int) -> int:
+        """Return when something arrived that is found now: after the look before this one, whatever the clock did.
+
+        A loop that is held up for some tenths of a second would otherwise take all that arrived meanwhile for one
+        moment, in which the order of messages and log records is lost.
+        """
+        if not clock_ns:
+            return now_ns
+        return min(now_ns, max(self._looked_before_ns, now_ns - self._clock_ns(now_ns) + clock_ns))
 
     def _observations(self) -> tuple[Observation, ...]:
-        self._logs += self._observer.logs()
-        return tuple(self._read())
+        self._logs += self._logged(self._stop_ns)
+        return tuple(sorted(self._read(), key=lambda one: one.t_ns))
 
     def _read(self) -> Iterator[Observation]:
         """Yield the observations, with the log records and thread faults that are found in the output."""

@@ -34,21 +34,24 @@ class Logged:
     text: str
     file: str
     line: int
+    arrived_ns: int = 0  # when the middleware received it, by the system clock; 0 if that is not known
 
 
 def read_console(
-    lines: Sequence[OutputLine], logs: Iterable[Logged], relative: Callable[[str], str]
+    lines: Sequence[OutputLine], logs: Iterable[tuple[int, Logged]], relative: Callable[[str], str]
 ) -> list[LogRecord | OutputLine | None]:
     """Classify each line of one process: a log record, a plain line, or None for a continuation of a record.
 
+    A line is found when the grader looks, which may be late; the record that tells the same may have arrived before.
+
     Args:
         lines: The output of the process, in order; only standard error has log records.
-        logs: The records that were published on /rosout.
+        logs: The records that were published on /rosout, each with the time at which it arrived, at the latest.
         relative: Makes a path relative to the submission; returns an empty string for a path outside of it.
     """
-    known: dict[tuple[int, int, str], list[Logged]] = {}
-    for one in logs:
-        known.setdefault((one.sec, one.nanosec, one.logger), []).append(one)
+    known: dict[tuple[int, int, str], list[tuple[int, Logged]]] = {}
+    for arrived_ns, one in logs:
+        known.setdefault((one.sec, one.nanosec, one.logger), []).append((arrived_ns, one))
     found: list[LogRecord | OutputLine | None] = list(lines)
     errors = [number for number, line in enumerate(lines) if line.stream == "stderr"]
     position = 0
@@ -58,7 +61,7 @@ def read_console(
         rest: list[int] = []
         if match is not None:
             severity, sec, nanosec, logger, text = match.groups()
-            log = _published(known.get((int(sec), int(nanosec), logger), []), text)
+            arrived_ns, log = _published(known.get((int(sec), int(nanosec), logger), []), text) or (line.t_ns, None)
             if log is not None:
                 more = [part for part in log.text.split("\n")[1:] if part]
                 rest = errors[position + 1 : position + 1 + len(more)]
@@ -67,7 +70,7 @@ def read_console(
             file = relative(log.file) if log else ""
             place = log.line if log and file else 0
             found[errors[position]] = LogRecord(
-                line.t_ns, line.process, severity, logger, text[:TEXT_CHARACTERS], file, place
+                min(arrived_ns, line.t_ns), line.process, severity, logger, text[:TEXT_CHARACTERS], file, place
             )
         for number in rest:
             found[number] = None
@@ -75,8 +78,8 @@ def read_console(
     return found
 
 
-def _published(candidates: list[Logged], first: str) -> Logged | None:
-    for index, log in enumerate(candidates):
+def _published(candidates: list[tuple[int, Logged]], first: str) -> tuple[int, Logged] | None:
+    for index, (_, log) in enumerate(candidates):
         if log.text.startswith(first):
             return candidates.pop(index)
     return None

@@ -120,6 +120,7 @@ class Taken:
     cdr: bytes
     value: Mapping[str, Any]
     sent_ns: int = 0  # when it was sent, by the system clock; 0 if that is not known
+    arrived_ns: int = 0  # when the middleware received it in this process, likewise
 
 
 def in_order(messages: Iterable[Taken]) -> list[Taken]:

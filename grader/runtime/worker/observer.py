@@ -36,6 +36,9 @@ from grader.runtime.worker.ros_names import asked, listed
 from grader.runtime.worker.service_ends import ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
+#: When a message was sent and when it arrived, as `take_message` names what the middleware says. Its threads receive
+#: messages whatever the grader itself is busy with.
+TIMESTAMPS = ("source_timestamp", "received_timestamp")
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
 #: Queue depth, enough for everything that can be published between two polls.
 DEPTH = 5000
@@ -307,8 +310,9 @@ class Observer:
                     break
                 # The message that goes beyond is still taken: a single one may be larger than all that is allowed.
                 left_bytes -= len(found[0])
-                sent_ns = int(found[1].get("source_timestamp", 0))
-                taken.append(replace(self._decoded(topic, interface, reader.msg_type, found[0]), sent_ns=sent_ns))
+                decoded = self._decoded(topic, interface, reader.msg_type, found[0])
+                sent_ns, arrived_ns = (int(found[1].get(name, 0)) for name in TIMESTAMPS)
+                taken.append(replace(decoded, sent_ns=sent_ns, arrived_ns=arrived_ns))
         return taken, left_bytes
 
     def take_rest(self) -> list[Taken]:
@@ -340,7 +344,8 @@ class Observer:
                 with contextlib.suppress(Exception):  # whatever bytes a student's node sends
                     log = deserialize_message(taken[0], self._logs.msg_type)
                     at = log.stamp.sec, log.stamp.nanosec
-                    found.append(Logged(*at, log.name, log.msg[:TEXT_CHARACTERS], log.file, log.line))
+                    arrived_ns = int(taken[1].get(TIMESTAMPS[1], 0))
+                    found.append(Logged(*at, log.name, log.msg[:TEXT_CHARACTERS], log.file, log.line, arrived_ns))
         return found
 
     def _decoded(self, topic: str, interface: str, message: Any, cdr: bytes) -> Taken:

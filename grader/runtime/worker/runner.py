@@ -161,12 +161,14 @@ class Runner(ABC):
             if not student.ended:
                 self._recorder.add(never_stopped(student.name, self._agenda.end_ns, self._plan.shutdown_ns))
 
-    def _record(self, now_ns: int, taken: Taken, *, early: bool = False) -> None:
+    def _record(self, now_ns: int, taken: Taken, *, early: bool = False, arrived_ns: int | None = None) -> None:
+        """Record a message, and let simulations react to it; they learn of it now, even if it arrived before."""
+        arrived_ns = now_ns if arrived_ns is None else arrived_ns
         # Before the message is recorded, after which its topic has been seen.
         first = taken.topic == self._plan.first_message_on and not self._recorder.seen(taken.topic)
         if first and not self._stop_ns:
-            self._agenda.end_ns = now_ns + self._plan.duration_ns
-        self._recorder.message(now_ns, taken, early=early)
+            self._agenda.end_ns = arrived_ns + self._plan.duration_ns
+        self._recorder.message(arrived_ns, taken, early=early)
         # Not after the end: a simulation would go on reacting to nodes that are about to leave.
         if self._simulations.exist and not (self._recorder.full or self._stop_ns):
             for event in self._simulations.hear(taken, self._moment(now_ns)):

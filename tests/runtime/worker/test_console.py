@@ -1,5 +1,7 @@
 """Standard error in ROS's own format: where records begin and end, and what ended a program."""
 
+import pytest
+
 from grader.runtime.model.trace import LogRecord, OutputLine
 from grader.runtime.worker.console import Logged, last_traceback, read_console, thread_tracebacks
 
@@ -10,8 +12,8 @@ def lines(*texts: str, stream: str = "stderr") -> list[OutputLine]:
     return [OutputLine(n, "a.py", stream, text) for n, text in enumerate(texts)]
 
 
-def logged(text: str, file: str = "/s/a.py", line: int = 7) -> Logged:
-    return Logged(1767225600, 42, "node", text, file, line)
+def logged(text: str, file: str = "/s/a.py", line: int = 7, arrived_ns: int = 0) -> tuple[int, Logged]:
+    return arrived_ns, Logged(1767225600, 42, "node", text, file, line)
 
 
 def relative(path: str) -> str:
@@ -22,6 +24,14 @@ def test_a_record_has_the_place_that_its_logger_publishes() -> None:
     """The console tells when and what, /rosout tells where."""
     (record,) = read_console(lines(f"[WARN] [{STAMP}] [node]: hello"), [logged("hello")], relative)
     assert record == LogRecord(0, "a.py", "WARN", "node", "hello", "a.py", 7)
+
+
+@pytest.mark.parametrize(("arrived_ns", "t_ns"), [(1, 1), (3, 2)])
+def test_a_record_counts_from_when_it_was_first_known(arrived_ns: int, t_ns: int) -> None:
+    """The console may be read late, and /rosout may be discovered late."""
+    told = logged("hello", arrived_ns=arrived_ns)
+    found = read_console(lines("", "", f"[WARN] [{STAMP}] [node]: hello"), [told], relative)
+    assert [one.t_ns for one in found if one] == [0, 1, t_ns]
 
 
 def test_a_record_of_several_lines_is_one() -> None:

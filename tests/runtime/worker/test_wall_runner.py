@@ -17,6 +17,7 @@ from grader.runtime.model.trace import ClockKind, FaultKind
 from grader.runtime.plan import PlannedConnection
 from grader.runtime.stimuli.messages import PlannedMessages
 from grader.runtime.stimuli.recorded import PlannedRecording
+from grader.runtime.worker.bare_runner import BareRunner
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.wall_runner import WallRunner
@@ -139,7 +140,24 @@ def test_what_the_nodes_make_the_grader_do_is_no_busy_machine() -> None:
     # Beside other programs the same work is interrupted many times, each time as briefly as ever.
     assert Run(quiet, held_up={300: 600}, work={300: 300}).trace.harness_problem == ""
     assert Run(quiet, held_up={300: 400}, work={300: 1}).trace.harness_problem != ""
+    # Slowed down to a fifteenth, programs are as slow.
+    assert Run(quiet, held_up={300: 300}, work={300: 20}).trace.harness_problem != ""
     assert Run(quiet, held_up={300: 400}, work={100: 300}).trace.harness_problem != ""
+
+
+@pytest.mark.parametrize(
+    ("said_ms", "counts_ms"), [(None, 500), (450, 450), (100, 200), (600, 500)], ids=["unknown", "", "before", "after"]
+)
+def test_what_a_late_look_finds_counts_from_its_arrival(said_ms: int | None, counts_ms: int) -> None:
+    """Between the looks, even where the system clock was set meanwhile."""
+    clock = Clock()
+    runner = BareRunner(plan(clock="wall"), [], cast("Observer", ScriptedObserver(World())))
+    runner._real_time, runner._started = clock, clock.now_ns
+    for looked_ms in (200, 500):
+        clock.now_ns = runner._started + looked_ms * MS
+        runner._note_delay()
+    said_ns = 0 if said_ms is None else EPOCH_NS + runner._started + said_ms * MS
+    assert runner._arrived(said_ns, runner._looked_ns) == counts_ms * MS
 
 
 def test_nodes_that_fill_the_machine_themselves_are_judged() -> None:
