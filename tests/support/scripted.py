@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.runtime.host.clock import EPOCH_NS
+from grader.runtime.host.protocol import ORDINARY
 from grader.runtime.model.trace import Endpoint, Fault, GraphSnapshot, OutputLine
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.numbers import PlannedNumbers
@@ -67,16 +68,10 @@ def wait(wake_ms: float | None = None, **fields: Any) -> Program:
     return answer
 
 
-def claim(kind: str, name: str, interface: str = FLOAT, **qos: Any) -> dict[str, Any]:
-    """Return what a host says of an endpoint."""
-    usual = {"reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
-    return {
-        "kind": kind,
-        "name": name,
-        "type": interface,
-        **(usual if kind in ("publisher", "subscription") else {}),
-        **qos,
-    }
+def claim(kind: str, name: str, interface: str = FLOAT, number: int = 0, **qos: Any) -> dict[str, Any]:
+    """Return what a host says of an endpoint, as the values of JSON."""
+    said = {"kind": kind, "name": name, "type": interface, "number": number}
+    return {**said, "qos": {**ORDINARY._asdict(), **qos}} if kind in ("publisher", "subscription") else said
 
 
 def looks(condition: Callable[[], bool], seconds: float, *, pause_s: float) -> bool:

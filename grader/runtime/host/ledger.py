@@ -28,6 +28,7 @@ from . import originals
 from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
 from .events import Events
 from .node_parts import context_of, declared_by, ends_of, full_name_of, handle_of, name_of, seen_by
+from .protocol import Claim, Qos
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -58,8 +59,6 @@ _CONTEXT_OK = Context.ok
 #: The kinds of endpoints of topics.
 ENDS_OF_TOPICS = ("publisher", "subscription")
 TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
-#: The QoS of a lifecycle state machine's publisher, which is not an rclpy publisher.
-_ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False, "lease_ns": 0}
 REAL_WAIT_SET: Any = _rclpy.WaitSet
 
 
@@ -260,10 +259,10 @@ class Ledger:
         self._endpoints[kind] = [reference for reference, _ in found]
         return [endpoint for _, endpoint in found]
 
-    def claims(self, domain: int) -> list[dict[str, Any]]:
-        """Return the claims: a description of every endpoint in a ROS domain, as plain JSON values."""
+    def claims(self, domain: int) -> list[Claim]:
+        """Return the claims: a description of everything in a ROS domain."""
         self.changed = self.removed = False
-        claims: list[dict[str, Any]] = []
+        claims: list[Claim] = []
         existing = self.nodes()
         seen = [node for node in existing if is_in(domain, node)]
         elsewhere = [end.handle for node in existing if node not in seen for end in ends_of(node)]
@@ -274,32 +273,26 @@ class Ledger:
             for endpoint in self.alive(kind):
                 if endpoint.topic_name in BACKGROUND or self.is_elsewhere(endpoint.handle):
                     continue
-                claims.append(
-                    {
-                        "kind": kind,
-                        "name": endpoint.topic_name,
-                        "type": type_name(endpoint.msg_type),
-                        "number": self.numbers[endpoint],
-                        **_qos(self._resolved.get(endpoint, endpoint.qos_profile), kind),
-                    }
-                )
+                qos = _qos(self._resolved.get(endpoint, endpoint.qos_profile), kind)
+                interface = type_name(endpoint.msg_type)
+                claims.append(Claim(kind, endpoint.topic_name, interface, self.numbers[endpoint], qos))
         claims += [
-            {
-                "kind": kind,
-                "name": service_name(endpoint),
-                "type": type_name(endpoint.srv_type),
-                "sends": _qos(endpoint.qos_profile, "publisher"),
-                "takes": _qos(endpoint.qos_profile, "subscription"),
-            }
+            Claim(
+                kind,
+                service_name(endpoint),
+                type_name(endpoint.srv_type),
+                sends=_qos(endpoint.qos_profile, "publisher"),
+                takes=_qos(endpoint.qos_profile, "subscription"),
+            )
             for kind in ("client", "service")
             for endpoint in self.alive(kind)
             if (kind == "client" or not _is_background(endpoint)) and not self.is_elsewhere(endpoint.handle)
         ]
         claims += [claim for end in self._actions for claim in end.claims()]
         nodes = [full_name_of(node) for node in seen]
-        claims += [{"kind": "node", "name": name, "type": ""} for name in nodes]
+        claims += [Claim("node", name, "") for name in nodes]
         claims += [
-            {**_ORDINARY, "kind": "publisher", "name": topic, "type": TRANSITION_EVENT}
+            Claim("publisher", topic, TRANSITION_EVENT)  # of a lifecycle state machine: no rclpy publisher
             for topic in self.transitions.values()
             if topic.rpartition("/")[0] in nodes
         ]
@@ -602,11 +595,11 @@ def _is_valid(handle: Any) -> bool:
         return False
 
 
-def parameters_of(node: Any) -> list[dict[str, str]]:
+def parameters_of(node: Any) -> list[Claim]:
     """Return the parameters that a node has declared, without those that every node has."""
     own = full_name_of(node)
     return [
-        {"kind": "parameter", "name": f"{own}:{name}", "type": repr(parameter.value)[:200]}
+        Claim("parameter", f"{own}:{name}", repr(parameter.value)[:200])
         for name, parameter in sorted(declared_by(node).items())
         if name not in BACKGROUND_PARAMETERS
     ]
@@ -625,7 +618,7 @@ def _channel(receiver: Any) -> str:
 
 def is_latched(publisher: Any) -> bool:
     """Return whether who discovers a publisher later gets its last messages as well."""
-    return bool(_qos(publisher.qos_profile, "publisher")["latched"])
+    return _qos(publisher.qos_profile, "publisher").latched
 
 
 def asks_for_best(values: Iterable[Any]) -> bool:
@@ -641,7 +634,7 @@ def asks_for_best(values: Iterable[Any]) -> bool:
     )
 
 
-def _qos(qos: Any, kind: str) -> dict[str, Any]:
+def _qos(qos: Any, kind: str) -> Qos:
     """Describe the QoS of a publisher or subscription, as far as it decides who is matched."""
     writes = kind == "publisher"
     # a service that asks for what is best gets the usual
@@ -652,13 +645,13 @@ def _qos(qos: Any, kind: str) -> dict[str, Any]:
         reliable = writes
     if qos.durability in (DurabilityPolicy.SYSTEM_DEFAULT, DurabilityPolicy.UNKNOWN):
         latched = writes
-    return {
-        "reliable": reliable,
-        "latched": latched,
-        "deadline_ns": finite_ns(qos.deadline),
-        "manual": qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC,
-        "lease_ns": finite_ns(qos.liveliness_lease_duration),
-    }
+    return Qos(
+        reliable,
+        latched,
+        finite_ns(qos.deadline),
+        manual=qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC,
+        lease_ns=finite_ns(qos.liveliness_lease_duration),
+    )
 
 
 def finite_ns(duration: Any) -> int:

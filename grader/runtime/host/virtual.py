@@ -12,6 +12,7 @@ from . import originals, threads, times
 from .clock import VirtualClock
 from .link import Link
 from .order import ReadyOrder
+from .protocol import plain
 from .replaced import as_builtin
 from .scheduler import GreenThread, Scheduler
 
@@ -206,7 +207,7 @@ class VirtualTime:
                 report["lost"] = dict(self._ledger.lost)
                 self._ledger.lost.clear()
             if self._ledger.changed and not (self._ledger.sending_and_removed or self._finishing):
-                report["endpoints"] = self._ledger.claims(self._domain)
+                report["endpoints"] = [plain(claim) for claim in self._ledger.claims(self._domain)]
                 report["sees_graph"] = self._ledger.sees_graph
         return report
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from . import originals
 from .link import Link
+from .protocol import Claim, plain
 
 #: How long, in real time, new publishers wait for the grader's subscriptions, and how the name of the grader's node
 #: begins.
@@ -214,11 +215,11 @@ class WallTime:
         if now == self._reported:
             return
         self._reported = now
-        claims: list[dict[str, str]] = []
+        claims: list[Claim] = []
         for node in nodes:
             with contextlib.suppress(Exception):  # it is being destroyed
                 claims += parameters_of(node)
-        self._link.send({"kind": "parameters", "claims": claims[:MOST_PARAMETERS]})
+        self._link.send({"kind": "parameters", "claims": [plain(claim) for claim in claims[:MOST_PARAMETERS]]})
 
     def report_early(self, topic: str, began_ns: int) -> None:
         """Report that what was sent on a topic was sent before anybody could have discovered its publisher.

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from grader.runtime.host.protocol import Claim
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Mark, Observation, Offer, Trace
 from grader.runtime.plan import Plan
@@ -184,12 +185,12 @@ class Runner(ABC):
         if self._recorder.full:
             self._agenda.end_by(now_ns)
 
-    def _note_offers(self, student: NodeProcess, claims: Iterable[Mapping[str, Any]], now_ns: int) -> None:
+    def _note_offers(self, student: NodeProcess, claims: Iterable[Claim], now_ns: int) -> None:
         """Record the services, clients and parameters of a process that are new."""
         for claim in claims:
-            offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
+            offer = (claim.kind, claim.name[:300], claim.type[:300])
             told = offer in student.offers or len(student.offers) >= OFFERS
-            if claim["kind"] in ("service", "client", "parameter") and not told:
+            if claim.kind in ("service", "client", "parameter") and not told:
                 student.offers.add(offer)
                 self._recorder.add(Offer(now_ns, student.name, *offer))
 

@@ -8,13 +8,14 @@ from dataclasses import replace
 from typing import Any
 
 from grader.runtime.host.originals import wait_until
+from grader.runtime.host.protocol import MOST_CLAIMS, Claim, counts
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Mark, Observation
 from grader.runtime.patience import Wait
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.server import AddServer, RemoveServer
-from grader.runtime.worker.claims import ORDINARY_END, counts, is_claim, passes
+from grader.runtime.worker.claims import ORDINARY_END, passes
 from grader.runtime.worker.core import Arriving, Command, Core, Limit, Play, Receive, Retry, RunProcess, Taken, senders
 from grader.runtime.worker.discovery import Discovery
 from grader.runtime.worker.ending import ending
@@ -25,8 +26,8 @@ from grader.runtime.worker.topic_peers import VirtualTopicPeers
 from grader.runtime.worker.trace_recorder import NAME_CHARACTERS
 from grader.runtime.worker.workload import Workload
 
-#: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
-MOST_REPORTS, CLAIMS = 10_000, 1_000
+#: The host never sends more reports before it waits or ends.
+MOST_REPORTS = 10_000
 #: Reasons for recording on the wall clock.
 THREADS = "the node's threads wait for each other without blocking"
 OUTSIDE = "the node waits for something that is neither ROS nor time"
@@ -188,12 +189,12 @@ class VirtualRunner(Runner):
             self._core.sent(student, sent)
         endpoints = report.get("endpoints")
         if isinstance(endpoints, list) and report["kind"] == "idle":
-            if len(endpoints) > CLAIMS:
-                why = f"more than {CLAIMS:,} endpoints and parameters of {student.name}"
+            if len(endpoints) > MOST_CLAIMS:
+                why = f"more than {MOST_CLAIMS:,} endpoints and parameters of {student.name}"
                 self._recorder.stop(self._core.now_ns, why)
                 # Nothing is recorded after this, and waiting until all of them are seen takes half a minute.
                 return
-            self._core.has(student, [c for c in endpoints if is_claim(c)])
+            self._core.has(student, [one for data in endpoints if (one := Claim.checked(data))])
             student.sees_graph = report.get("sees_graph") is True
             self._note_offers(student, student.claims, self._core.now_ns)
             self._discovery.match(self._core.now_ns)

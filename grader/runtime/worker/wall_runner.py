@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar, Protocol
 
+from grader.runtime.host.protocol import Claim
 from grader.runtime.model.quantities import NS_PER_MS
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Mark, Message, Observation, Offer
@@ -20,7 +21,6 @@ from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.events import Disappear
 from grader.runtime.stimuli.messages import Advertise
 from grader.runtime.stimuli.server import RemoveServer
-from grader.runtime.worker.claims import is_claim
 from grader.runtime.worker.ending import ending
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.runner import Runner
@@ -230,8 +230,8 @@ class WallRunner(Runner):
 
     def _note_parameters(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
         claims = report.get("claims")
-        valid = [claim for claim in claims if is_claim(claim)] if isinstance(claims, list) else []
-        self._note_offers(student, (claim for claim in valid if claim["kind"] == "parameter"), now_ns)
+        valid = [one for data in claims if (one := Claim.checked(data))] if isinstance(claims, list) else []
+        self._note_offers(student, (claim for claim in valid if claim.kind == "parameter"), now_ns)
 
     def _note_services(self, now_ns: int) -> None:
         """Record the services and clients in the graph; one of several processes is known by its parameters alone."""
@@ -239,7 +239,7 @@ class WallRunner(Runner):
         only = self._students[0] if len(self._students) == 1 else None
         for end in self._recorder.graph.services:
             student = only or nodes.get(end.node)
-            claim = {"kind": end.kind, "name": end.service, "type": end.type}
+            claim = Claim(end.kind, end.service, end.type)
             if student is not None:
                 self._note_offers(student, [claim], now_ns)
             elif (offer := (end.kind, end.service, end.type)) not in self._nobodys:

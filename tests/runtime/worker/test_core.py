@@ -11,6 +11,7 @@ import pytest
 
 from grader.runtime.host import virtual
 from grader.runtime.host.clock import AHEAD_NS, EPOCH_NS, LATE_NS, LOOK_NS, TASKS_AT_ONCE, VirtualClock
+from grader.runtime.host.protocol import ORDINARY, Claim
 from grader.runtime.host.scheduler import GreenThread, Scheduler
 from grader.runtime.host.virtual import STOPPING_NS, VirtualTime
 from grader.runtime.model.scenario import Event
@@ -111,8 +112,8 @@ class Played:
                 return f"limit: {command.why}"
 
 
-def claim(kind: str, name: str, interface: str = FLOAT, **qos: Any) -> dict[str, Any]:
-    return {"kind": kind, "name": name, "type": interface, "latched": False, **qos}
+def claim(kind: str, name: str, interface: str = FLOAT, number: int = 0, **qos: Any) -> Claim:
+    return Claim(kind, name, interface, number, ORDINARY._replace(**qos))
 
 
 def stop(at_ms: float, topic: str = "/x") -> Disappear:

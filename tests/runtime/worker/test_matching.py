@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from grader.runtime.host.protocol import ORDINARY, Claim
 from grader.runtime.stimuli.messages import PlannedMessages
 from grader.runtime.worker.core import Agenda, Core, Process
 from grader.runtime.worker.matching import Match, Matching
@@ -29,9 +30,7 @@ class Services:
 class Endpoints:
     """Some processes with their endpoints, and the grader's."""
 
-    def __init__(
-        self, *graders: tuple[str, str], watched: tuple[str, ...] = (), **claims: list[dict[str, Any]]
-    ) -> None:
+    def __init__(self, *graders: tuple[str, str], watched: tuple[str, ...] = (), **claims: list[Claim]) -> None:
         self.processes = {name: Process(name) for name in claims}
         self.core = Core([*self.processes.values()], Agenda([], {}, 0))
         watching = [False, True]
@@ -48,8 +47,8 @@ class Endpoints:
         return found
 
 
-def claim(kind: str, name: str, interface: str = FLOAT, **qos: Any) -> dict[str, Any]:
-    return {"kind": kind, "name": name, "type": interface, "latched": False, **qos}
+def claim(kind: str, name: str, interface: str = FLOAT, number: int = 0, **qos: Any) -> Claim:
+    return Claim(kind, name, interface, number, ORDINARY._replace(**qos))
 
 
 @pytest.mark.rule(13)
@@ -94,8 +93,8 @@ def test_servers_and_clients_wait_for_each_other_and_for_the_graders() -> None:
 @pytest.mark.rule(13)
 def test_a_client_whose_responses_do_not_come_waits_until_it_is_heard() -> None:
     """Its requests arrive, and a service that has left is to disappear."""
-    asks_for_more = {"sends": {}, "takes": {"deadline_ns": 5}}
-    ends = Endpoints(server=[claim("service", "/s", TRIGGER)], client=[claim("client", "/s", TRIGGER, **asks_for_more)])
+    asks_for_more = claim("client", "/s", TRIGGER)._replace(takes=ORDINARY._replace(deadline_ns=5))
+    ends = Endpoints(server=[claim("service", "/s", TRIGGER)], client=[asks_for_more])
     assert ends.asked() == {"server": {"service": {"/s": [1]}}, "client": {"heard": {"/s": [1]}}}
     ends.core.has(ends.processes["client"], [claim("client", "/s", TRIGGER)])
     ends.asked()

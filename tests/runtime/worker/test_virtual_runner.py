@@ -669,14 +669,21 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=6,
 )
+QOS = st.fixed_dictionaries(
+    {},
+    optional={
+        **{name: st.booleans() | JSON for name in ("reliable", "latched", "manual")},
+        **{name: st.integers() | JSON for name in ("deadline_ns", "lease_ns")},
+    },
+)
 CLAIM = st.fixed_dictionaries(
     {},
     optional={
         "kind": st.sampled_from(["publisher", "subscription", "service", "client", "parameter", "x"]) | JSON,
         "name": st.sampled_from(["/temperature", "/x", ""]) | JSON,
         "type": st.sampled_from([FLOAT, INT, "std_msgs/msg/String", "os/msg/Path", "no"]) | JSON,
-        **{name: st.booleans() | JSON for name in ("reliable", "latched", "manual")},
-        "deadline_ns": st.integers() | JSON,
+        "number": st.integers() | JSON,
+        **dict.fromkeys(("qos", "sends", "takes"), QOS | JSON),
     },
 )
 REPORT = st.fixed_dictionaries(
