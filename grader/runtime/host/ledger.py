@@ -10,7 +10,7 @@ import functools
 import math
 import weakref
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from rclpy.context import Context
@@ -28,7 +28,7 @@ from . import originals
 from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
 from .events import Events
 from .node_parts import context_of, declared_by, ends_of, full_name_of, handle_of, name_of, seen_by
-from .protocol import Claim, Qos
+from .protocol import Claim, Counterparts, Qos
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -313,7 +313,7 @@ class Ledger:
         self.contexts.append(weakref.ref(context_of(node)))
         self.changed = True
 
-    def expect(self, arrivals: dict[str, int]) -> None:
+    def expect(self, arrivals: Mapping[str, int]) -> None:
         """Add messages that the grader has announced, and wait until they have arrived."""
         overflows = False
         for channel, count in arrivals.items():
@@ -415,13 +415,11 @@ class Ledger:
             for endpoint in self.alive(kind)
         }
 
-    def await_matches(self, expected: dict[str, dict[str, list[int]]], wait_s: float) -> list[str]:
+    def await_matches(self, expected: Counterparts, wait_s: float) -> list[str]:
         """Wait, in real time, until endpoints have the expected counterparts; return the names of those that do not.
 
         Args:
-            expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any. Under
-                `refused`, for the number of an endpoint, how many counterparts its QoS has not fitted so far. Under
-                `heard`, for a service, how many servers get the requests of a client that they cannot answer.
+            expected: The counterparts.
             wait_s: Time-out in seconds.
         """
         matched = originals.wait_until(lambda: not self._unmatched(expected), wait_s)
@@ -431,17 +429,17 @@ class Ledger:
             self._strangers.update(self._surplus(expected))
         return missing
 
-    def await_events(self, refused: dict[str, list[int]], wait_s: float) -> list[str]:
+    def await_events(self, refused: Mapping[str, int], wait_s: float) -> list[str]:
         """Wait, in real time, until the middleware has reported all counterparts, and let the program know.
 
         Args:
-            refused: What `await_matches` was given under this name.
+            refused: As `Counterparts.refused`.
             wait_s: Time-out in seconds.
 
         Returns:
             The names of the endpoints whose counterparts it has not all reported.
         """
-        most = {int(number): counts[0] for number, counts in refused.items()}
+        most = {int(number): count for number, count in refused.items()}
         told = originals.wait_until(lambda: not self._untold(most), wait_s)
         untold = [] if told else self._untold(most)
         self.events.tell()
@@ -462,7 +460,7 @@ class Ledger:
             )
         ]
 
-    def _surplus(self, expected: dict[str, dict[str, list[int]]]) -> dict[tuple[str, str], int]:
+    def _surplus(self, expected: Counterparts) -> dict[tuple[str, str], int]:
         """Count the counterparts, by kind and name, that neither the grader expects nor an earlier wait has found.
 
         A server that still sees a client that has left sends its response, which wakes all other clients.
@@ -473,8 +471,8 @@ class Ledger:
                 if endpoint.topic_name not in BACKGROUND:
                     over[kind, endpoint.topic_name] += _matches(kind, endpoint) or 0
         for kind, name in over:
-            over[kind, name] -= sum(expected.get(kind, {}).get(name, ()))
-        services = expected.get("service", {})
+            over[kind, name] -= sum(getattr(expected, kind).get(name, ()))
+        services = expected.service
         for name in self._served():
             over["service", name] = (self._clients_of(name) or 0) - max(services.get(name, ()), default=0)
         return {key: count for key, count in over.items() if count > self._strangers.get(key, 0)}
@@ -485,32 +483,33 @@ class Ledger:
         of_actions = (name for end in self._actions if end.kind == "service" for name in end.services())
         return {*map(service_name, servers), *of_actions}
 
-    def await_absence(self, services: list[str], wait_s: float) -> None:
+    def await_absence(self, services: Sequence[str], wait_s: float) -> None:
         """Wait, in real time, until clients see that the servers of some services are gone."""
         clients = [client for client in self.alive("client") if service_name(client) in services]
         originals.wait_until(lambda: not any(_matches("client", client) for client in clients), wait_s)
 
-    def _unmatched(self, expected: dict[str, dict[str, list[int]]]) -> list[str]:
+    def _unmatched(self, expected: Counterparts) -> list[str]:
         missing = []
-        if "graph" in expected and self._graph() not in (None, expected["graph"]):
+        if expected.graph is not None and self._graph() not in (None, expected.graph):
             missing.append("graph")
         missing += [
             f"client {service}"
-            for service, (count,) in expected.get("heard", {}).items()
+            for service, count in expected.heard.items()
             if (servers := self._servers_of(service)) is not None and servers < count
         ]
-        for kind, names in expected.items():
+        for kind in self._endpoints:
+            names: Mapping[str, Sequence[int]] = getattr(expected, kind)
             found: dict[str, list[float]] = {}
-            for endpoint in self.alive(kind) if kind in self._endpoints else ():
+            for endpoint in self.alive(kind) if names else ():
                 name = endpoint.topic_name if kind in ENDS_OF_TOPICS else service_name(endpoint)
                 if name in names:
                     has = self._clients_of(name) if kind == "service" else _matches(kind, endpoint)
                     found.setdefault(name, []).append(math.inf if has is None else has)
-            for end in self._actions if kind == "client" else ():
+            for end in self._actions if names and kind == "client" else ():
                 if end.kind == kind and names.keys() & set(end.services()):
                     served = _asked(functools.partial(HAS_SERVER, end.handle))
                     found.setdefault(end.services()[0], []).append(math.inf if served is None else served)
-            for end in self._actions if kind == "service" else ():
+            for end in self._actions if names and kind == "service" else ():
                 for name in names.keys() & set(end.services()) if end.kind == kind else ():
                     asking = self._clients_of(name)
                     found.setdefault(name, []).append(math.inf if asking is None else asking)
@@ -520,7 +519,7 @@ class Ledger:
                     missing.append(f"{kind} {name}")
         return missing
 
-    def _graph(self) -> dict[str, list[int]] | None:
+    def _graph(self) -> dict[str, int] | None:
         """Count the graph as the newest node sees it, in the same way as the grader does; None without a node."""
         node = self._node()
         if node is None:
@@ -538,7 +537,7 @@ class Ledger:
                 if not types[0].startswith(BACKGROUND_SERVICES):
                     found[f"service {service}"] = handle.get_count_services(service)
                     found[f"client {service}"] = handle.get_count_clients(service)
-        return {name: [count] for name, count in found.items() if count}
+        return {name: count for name, count in found.items() if count}
 
     def _clients_of(self, service: str) -> int | None:
         """Return how many clients of a service this process sees; None without a node to ask."""

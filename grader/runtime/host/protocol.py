@@ -205,11 +205,71 @@ class Progress(NamedTuple):
         )
 
 
+#: The most files that are kept of those that a program wrote.
+MOST_WRITTEN = 20
+
+
 class WrittenContent(NamedTuple):
     """A small file that a program wrote."""
 
     name: str  # relative to the folder that it was found in
     content: str  # in base64
+
+
+class LaunchedNode(NamedTuple):
+    """A node that a launch file describes."""
+
+    package: str = ""  # of its program; empty if the launch file names none
+    near: str = ""  # the package of the submission that this one seems to be a misspelling of
+    executable: str = ""
+    arguments: Sequence[str] = ()
+    ros_arguments: Sequence[str] = ()  # what follows `--ros-args`
+    parameter_files: Sequence[Sequence[str]] = ()  # name and text of each
+    delay_s: float = 0.0  # after the start of the launch file
+    file: str = ""  # where it is described: a path in the submission, or the name of a file of the rubric
+    line: int = 0
+
+    @classmethod
+    def checked(cls, data: Mapping[str, Any]) -> "LaunchedNode":
+        """Return what a process reports."""
+        delay_s = data.get("delay_s")
+        files = [one for one in _list(data.get("parameter_files")) if isinstance(one, list) and len(one) == 2]
+        return cls(
+            _text(data.get("package")),
+            _text(data.get("near")),
+            _text(data.get("executable")),
+            list(map(_text, _list(data.get("arguments")))),
+            list(map(_text, _list(data.get("ros_arguments")))),
+            [(_text(name), _text(text)) for name, text in files],
+            delay_s if isinstance(delay_s, (int, float)) else 0.0,
+            _text(data.get("file")),
+            _number(data.get("line")) or 0,
+        )
+
+
+class LeftOut(NamedTuple):
+    """Something in a launch file that is not evaluated; the worker has the words for each code."""
+
+    code: str = ""  # a key of `notes._LEFT_OUT`
+    name: str = ""  # which one
+    text: str = ""  # what it was given
+    times: int = 1  # how often it is left out at this place
+    ends: bool = False  # whether nothing after it was evaluated
+    file: str = ""  # as in `LaunchedNode`
+    line: int = 0
+
+    @classmethod
+    def checked(cls, data: Mapping[str, Any]) -> "LeftOut":
+        """Return what a process reports."""
+        return cls(
+            _text(data.get("code")),
+            _text(data.get("name")),
+            _text(data.get("text")),
+            _number(data.get("times")) or 0,
+            data.get("ends") is True,
+            _text(data.get("file")),
+            _number(data.get("line")) or 0,
+        )
 
 
 # ------------------------------------------------------------------------------------------ reports: host to worker
@@ -349,8 +409,10 @@ class Written(NamedTuple):
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> "Written":
         """Return what a process reports; whether it may have such names and contents is for the worker to see."""
-        files = [one for one in _list(data.get("files")) if isinstance(one, dict)]
-        return cls([WrittenContent(*(_text(one.get(name)) for name in WrittenContent._fields)) for one in files])
+        files = [one for one in _list(data.get("files"))[:MOST_WRITTEN] if isinstance(one, dict)]
+        found = [(one.get("name"), one.get("content")) for one in files]
+        texts = [(name, content) for name, content in found if isinstance(name, str) and isinstance(content, str)]
+        return cls([WrittenContent(*one) for one in texts])
 
 
 class EarlyMessage(NamedTuple):
@@ -380,6 +442,23 @@ class Parameters(NamedTuple):
         return cls(_claims(data.get("claims")) or ())
 
 
+class Launched(NamedTuple):
+    """What a launch file describes: the only report of a process that evaluates one, after `Ready`."""
+
+    nodes: Sequence[LaunchedNode] = ()
+    left_out: Sequence[LeftOut] = ()
+    fault: ReportedFault | None = None  # what ended the evaluation; there are no nodes then
+
+    @classmethod
+    def checked(cls, data: Mapping[str, Any]) -> "Launched":
+        """Return what a process reports."""
+        return cls(
+            [LaunchedNode.checked(one) for one in _list(data.get("nodes")) if isinstance(one, dict)],
+            [LeftOut.checked(one) for one in _list(data.get("left_out")) if isinstance(one, dict)],
+            ReportedFault.checked(data["fault"]) if "fault" in data else None,
+        )
+
+
 class Unknown(NamedTuple):
     """What the host never sends, so that it comes from the program."""
 
@@ -396,6 +475,7 @@ Report: TypeAlias = (
     | Written
     | EarlyMessage
     | Parameters
+    | Launched
     | Unknown
 )
 
@@ -436,6 +516,9 @@ class Counterparts(NamedTuple):
     graph: Mapping[str, int] | None = None  # by kind and name: what the graph holds; None if its program does not look
 
 
+NO_COUNTERPARTS = Counterparts()
+
+
 class AwaitMatches(NamedTuple):
     """In virtual time, while it waits for an answer: it waits until its endpoints have their counterparts."""
 
@@ -461,6 +544,7 @@ _REPORTS: Mapping[Any, str] = {
     Written: "written",
     EarlyMessage: "early",
     Parameters: "parameters",
+    Launched: "launched",
 }
 _ANSWERS: Mapping[Any, str] = {Go: "go", Stop: "stop", Expect: "expect", AwaitMatches: "match"}
 _KINDS = {**_REPORTS, **_ANSWERS}

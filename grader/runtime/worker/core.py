@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
-from grader.runtime.host.protocol import Claim
+from grader.runtime.host.protocol import NO_COUNTERPARTS, Claim, Counterparts
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Event
@@ -40,7 +40,7 @@ class Process:
         name: The wanted file name, which identifies the process in traces.
         wake_ns: When it next wants to run, in nanoseconds of virtual time, or None.
         claims: Its endpoints, as it reports them.
-        told: The counterparts that it has to wait for: kind of endpoint -> name -> numbers of them.
+        told: The counterparts that it has to wait for.
         renewed: Whether it has reported its endpoints since then.
         sees_graph: Whether its program queries the graph, as it reports.
         arrivals: Messages that are on their way to it and not yet announced to it, by channel.
@@ -53,7 +53,7 @@ class Process:
     name: str
     wake_ns: int | None = field(default=None, kw_only=True)
     claims: list[Claim] = field(default_factory=list, kw_only=True)
-    told: dict[str, dict[str, list[int]]] = field(default_factory=dict, kw_only=True)
+    told: Counterparts = field(default=NO_COUNTERPARTS, kw_only=True)
     renewed: bool = field(default=False, kw_only=True)
     sees_graph: bool = field(default=False, kw_only=True)
     arrivals: dict[str, int] = field(default_factory=dict, kw_only=True)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from contextlib import nullcontext
-from typing import Any
 
-from grader.runtime.host.protocol import Claim, is_name
+from grader.runtime.host.protocol import AwaitMatches, Claim, Matched, is_name
 from grader.runtime.model.trace import GraphSnapshot
 from grader.runtime.patience import SETTLE_S, Patience, Wait
 from grader.runtime.stimuli.calls import PlannedCalls
@@ -23,8 +22,6 @@ from grader.runtime.worker.trace_recorder import NAME_CHARACTERS, TraceRecorder
 DEPARTURE_S = 2.0
 #: Querying the graph is expensive: the pause keeps the queries from delaying discovery itself.
 GRAPH_PAUSE_S = 0.003
-#: The host never reports more unmatched names than this.
-MOST_UNMATCHED = 10_000
 
 #: Kind, name and type of an endpoint as the graph counts it. Servers and clients are counted by name alone.
 Key = tuple[str, str, str]
@@ -131,13 +128,13 @@ class Discovery:
         """Let a process wait, and note what it has missed."""
         student = question.process
         with nullcontext() if student.workload is None else student.workload.beside():
-            student.tell({"match": question.expected, "gone": question.gone, "wait_s": self.patience.wait_s})
+            student.tell(AwaitMatches(question.expected, question.gone, self.patience.wait_s))
             answer = student.report()
-        if answer is None or answer.get("kind") != "matched":
+        if not isinstance(answer, Matched):
             self._mark_dead(student)
             return
-        missing = [str(end).partition(" ") for end in _listed(answer.get("missing"))]
-        untold = [str(end).partition(" ") for end in _listed(answer.get("untold"))]
+        missing = [end.partition(" ") for end in answer.missing]
+        untold = [end.partition(" ") for end in answer.untold]
         self.matching.matched(student, [(kind, name) for kind, _, name in missing])
         if missing or untold:
             self.patience.lose()
@@ -221,10 +218,6 @@ class Discovery:
 
     def _record(self) -> None:
         self._recorder.look(self._observer.with_qos(self._graph), self._observer.participants())
-
-
-def _listed(value: Any) -> list[Any]:
-    return value[:MOST_UNMATCHED] if isinstance(value, list) else []
 
 
 def _wanted(claims: list[Claim]) -> Counter[Key]:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Generic, Protocol
 
-from grader.runtime.host.protocol import ORDINARY, Claim
+from grader.runtime.host.protocol import NO_COUNTERPARTS, ORDINARY, Claim, Counterparts
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.stimuli.messages import PlannedMessages
 from grader.runtime.worker.claims import CHANNELS, ORDINARY_END, answers, compatible, fits, passes, readers_of, serves
@@ -29,12 +29,12 @@ class Match(Generic[P]):
 
     Attributes:
         process: The process.
-        expected: Kind of endpoint -> name -> numbers of counterparts; see `await_matches` of the host's ledger.
+        expected: The counterparts.
         gone: The services whose servers have left, and are to disappear.
     """
 
     process: P
-    expected: Mapping[str, Mapping[str, list[int]]]
+    expected: Counterparts
     gone: list[str]
 
 
@@ -127,10 +127,11 @@ class Matching(Generic[P]):
         claims = self.claims()
         self._count_refused()
         for process in self._core.processes:
-            if not process.ended and (process.claims or process.told):
+            if not process.ended and (process.claims or process.told != NO_COUNTERPARTS):
                 expected = self._expected(process, claims, graph)
-                gone = sorted(process.told.get("client", {}).keys() - expected.get("client", {}).keys())
-                if expected == process.told and not ((process.renewed or process.unmatched) and expected):
+                gone = sorted(process.told.client.keys() - expected.client.keys())
+                again = (process.renewed or process.unmatched) and expected != NO_COUNTERPARTS
+                if expected == process.told and not again:
                     continue
                 process.told, process.renewed = expected, False
                 yield Match(process, expected, gone)
@@ -161,19 +162,20 @@ class Matching(Generic[P]):
                     self._refused.setdefault(reader, set()).add(writer)
                     self._refused.setdefault(writer, set()).add(reader)
 
-    def _expected(self, process: P, claims: list[Claim], graph: Mapping[str, int]) -> dict[str, dict[str, list[int]]]:
-        expected: dict[str, dict[str, list[int]]] = {}
+    def _expected(self, process: P, claims: list[Claim], graph: Mapping[str, int]) -> Counterparts:
+        ends: dict[str, dict[str, list[int]]] = {
+            kind: {} for kind in ("publisher", "subscription", "client", "service")
+        }
+        heard, refused = {}, {}
         for claim in process.claims:
             count = self._counterparts(claim, claims)
             if count:
-                expected.setdefault(claim.kind, {}).setdefault(claim.name, []).append(count)
-            elif claim.kind == "client" and (heard := self._hearing(claim, claims)):
-                expected.setdefault("heard", {})[claim.name] = [heard]
-            if refused := self._refused.get((process.name, claim.number)):
-                expected.setdefault("refused", {})[str(claim.number)] = [len(refused)]
-        if process.sees_graph:
-            expected["graph"] = {name: [count] for name, count in graph.items()}
-        return expected
+                ends[claim.kind].setdefault(claim.name, []).append(count)
+            elif claim.kind == "client" and (hearing := self._hearing(claim, claims)):
+                heard[claim.name] = hearing
+            if kept_apart := self._refused.get((process.name, claim.number)):
+                refused[str(claim.number)] = len(kept_apart)
+        return Counterparts(**ends, heard=heard, refused=refused, graph=dict(graph) if process.sees_graph else None)
 
     def _counterparts(self, claim: Claim, claims: list[Claim]) -> int:
         kind, name = claim.kind, claim.name

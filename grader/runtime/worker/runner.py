@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from grader.runtime.host.protocol import Claim
+from grader.runtime.host.protocol import Claim, ThreadFault
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Mark, Observation, Offer, Trace
 from grader.runtime.plan import Plan
@@ -194,10 +194,9 @@ class Runner(ABC):
                 student.offers.add(offer)
                 self._recorder.add(Offer(now_ns, student.name, *offer))
 
-    def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
+    def _report_fault(self, student: NodeProcess, report: ThreadFault, now_ns: int) -> None:
         """Record a fault that a process has reported."""
-        fault, limits = report.get("fault"), self._plan.limits
-        self._recorder.add(reported_fault(student.name, now_ns, fault, limits, student.places))
+        self._recorder.add(reported_fault(student.name, now_ns, report.fault, self._plan.limits, student.places))
 
     def _arrival(self, event: Event) -> Event | None:
         """Return an event as it reaches the processes; None for a message that is lost on the way."""
