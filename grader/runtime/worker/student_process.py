@@ -19,10 +19,12 @@ from grader.runtime.host.protocol import (
     MOST_WRITTEN,
     Answer,
     Exited,
+    Launched,
     Note,
     Reached,
     Ready,
     Report,
+    ThreadFault,
     Written,
     WrittenContent,
     line_of,
@@ -286,7 +288,8 @@ class NodeProcess(Process):
     def _parsed_report(self) -> Report | None:
         line, _, self._pending = self._pending.partition(b"\n")
         report = report_of(line)
-        self.grader_failed = self.grader_failed or graders_fault(self.name, getattr(report, "fault", None))
+        if isinstance(report, (Exited, ThreadFault, Launched)):
+            self.grader_failed = self.grader_failed or graders_fault(self.name, report.fault)
         return report
 
     def reports(self) -> list[Report | None]:

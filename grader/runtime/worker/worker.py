@@ -514,7 +514,7 @@ def _await_ready(student: NodeProcess) -> None:
 
 def _last_words(student: NodeProcess) -> str:
     student.drain()
-    words = [getattr(line, "text", "") for line in student.output(0, final=True)]
+    words = [one.text for one in student.output(0, final=True)]
     return " | ".join(words[-3:])[:500] or "no output"
 
 
