@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterable, Mapping
+from collections.abc import Callable, Collection, Generator, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from grader.runtime.host.clock import EPOCH_NS
+from grader.runtime.host.protocol import (
+    NO_COUNTERPARTS,
+    ORDINARY,
+    Answer,
+    AwaitMatches,
+    Claim,
+    Go,
+    Note,
+    Progress,
+    Report,
+    checked,
+)
 from grader.runtime.model.trace import Endpoint, Fault, GraphSnapshot, OutputLine
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.numbers import PlannedNumbers
@@ -23,7 +35,7 @@ MS = 1_000_000
 LOOKS = 20
 FLOAT, INT = "std_msgs/msg/Float32", "std_msgs/msg/Int32"
 
-#: Yields reports and is sent answers.
+#: Yields reports, as the values of JSON that a process may send, and is sent answers.
 Program = Generator[dict[str, Any] | None, Any, Any]
 Behaviour = Callable[["ScriptedStudent", "World"], Program]
 
@@ -62,21 +74,15 @@ def idle(wake_ms: float | None = None, **fields: Any) -> dict[str, Any]:
 def wait(wake_ms: float | None = None, **fields: Any) -> Program:
     """Wait until a time or until something arrives, as hosts do when they are woken for nothing; return the answer."""
     answer = yield idle(wake_ms, **fields)
-    while not answer.get("arrivals") and (wake_ms is None or answer["now_ns"] < EPOCH_NS + wake_ms * MS):
+    while not answer.arrivals and (wake_ms is None or answer.now_ns < EPOCH_NS + wake_ms * MS):
         answer = yield idle(wake_ms)
     return answer
 
 
-def claim(kind: str, name: str, interface: str = FLOAT, **qos: Any) -> dict[str, Any]:
-    """Return what a host says of an endpoint."""
-    usual = {"reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
-    return {
-        "kind": kind,
-        "name": name,
-        "type": interface,
-        **(usual if kind in ("publisher", "subscription") else {}),
-        **qos,
-    }
+def claim(kind: str, name: str, interface: str = FLOAT, number: int = 0, **qos: Any) -> dict[str, Any]:
+    """Return what a host says of an endpoint, as the values of JSON."""
+    said = {"kind": kind, "name": name, "type": interface, "number": number}
+    return {**said, "qos": {**ORDINARY._asdict(), **qos}} if kind in ("publisher", "subscription") else said
 
 
 def looks(condition: Callable[[], bool], seconds: float, *, pause_s: float) -> bool:
@@ -121,7 +127,7 @@ class ScriptedWorkload:
         """Measure nothing."""
         return nullcontext()
 
-    def end(self, report: Mapping[str, Any], passed_ns: int) -> None:
+    def end(self, progress: Progress, passed_ns: int) -> None:
         """Take what the step cost."""
         self.delay.work(self._student.cost_ns)
 
@@ -135,9 +141,9 @@ class ScriptedStudent:
     def __init__(self, name: str, program: Callable[[ScriptedStudent, World], Program], world: World) -> None:
         self.name = name
         self.wake_ns: int | None = None
-        self.claims: list[dict[str, Any]] = []
+        self.claims: list[Claim] = []
         self.arrivals: dict[str, int] = {}
-        self.told: dict[str, dict[str, list[int]]] = {}
+        self.told = NO_COUNTERPARTS
         self.offers: set[tuple[str, str, str]] = set()
         self.nudged = False
         self.ended = False
@@ -150,10 +156,10 @@ class ScriptedStudent:
         self.places = Places(HERE)
         self.start_told = None
         self.stop_signalled = self.stopping = False
-        self.heard: list[dict[str, Any]] = []
+        self.heard: list[Answer] = []
         self.missing: Any = []
         self._written: list[str] = []
-        self._answer: dict[str, Any] | None = None
+        self._answer: Answer | None = None
         self._discovery = False
         self._program = program(self, world)
         self._begun = False
@@ -165,25 +171,25 @@ class ScriptedStudent:
 
     def times_ms(self) -> list[float]:
         """Return the times it was told, in virtual milliseconds."""
-        return [(a["now_ns"] - EPOCH_NS) / MS for a in self.heard if "now_ns" in a]
+        return [(a.now_ns - EPOCH_NS) / MS for a in self.heard if isinstance(a, Go)]
 
     def measured(self, t_ns: int) -> ScriptedWorkload:
         """Return what measures its steps."""
         self.workload = self.workload or ScriptedWorkload(self, t_ns)
         return self.workload
 
-    def tell(self, answer: dict[str, Any]) -> None:
+    def tell(self, answer: Answer) -> None:
         """Take an answer of the runner."""
-        self._discovery = "match" in answer
+        self._discovery = isinstance(answer, AwaitMatches)
         if not self._discovery:
             self._answer = answer
         self.heard.append(answer)
 
-    def report(self) -> dict[str, Any] | None:
-        """Return the next report."""
+    def report(self) -> Report | None:
+        """Return the next report, checked as what comes from any process."""
         if self._discovery:
             self._discovery = False
-            return {"kind": "matched", "missing": self.missing}
+            return checked({"kind": "matched", "missing": self.missing})
         answer, self._answer = self._answer, None
         try:
             if not self._begun:
@@ -194,22 +200,24 @@ class ScriptedStudent:
         except StopIteration:
             report = {"kind": "exited", "code": 0}
         self.cost_ns = (report or {}).get("cost_ns", 0)
-        return report
+        return None if report is None else checked(report)
 
-    def reports(self) -> list[dict[str, Any] | None]:
+    def reports(self) -> list[Report | None]:
         """Return what has come without waiting, for the wall clock: a report, or nothing for an empty one."""
         self._begun = True
         found = next(self._program, {"kind": "silent"})
-        return [] if found is not None and found.get("kind") == "silent" else [found]
+        if found is None:
+            return [None]
+        return [] if found.get("kind") == "silent" else [checked(found)]
 
     def output(self, t_ns: int, *, final: bool = False) -> list[OutputLine]:
         """Return what was written since the last time."""
         written, self._written = self._written, []
         return [OutputLine(t_ns, self.name, "stdout", text) for text in written]
 
-    def note(self, report: dict[str, Any]) -> None:
+    def note(self, report: Note) -> None:
         """Take a note."""
-        self.notes.append(str(report.get("code")))
+        self.notes.append(report.code)
 
     def drain(self, reads: int = 1) -> None:
         """Read what has been written: it has been."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from . import originals
+from .protocol import ORDINARY, Claim
 
 if TYPE_CHECKING:
     from .clock import VirtualClock
@@ -148,21 +149,18 @@ class ActionEnd:
         """Return the names of its services."""
         return [f"{self._prefix}{part}" for part in SERVICES]
 
-    def claims(self) -> list[dict[str, Any]]:
+    def claims(self) -> list[Claim]:
         """Return its services and topics as claims for the grader."""
         services = [(self.kind, part, interface) for part, interface in SERVICES.items()]
         topic = "publisher" if self.kind == "service" else "subscription"
         topics = [(topic, part, interface) for part, interface in TOPICS.items()]
         return [
-            {
-                "kind": kind,
-                "name": f"{self._prefix}{part}",
-                "type": interface.format(self._interface),
-                "reliable": True,
-                "latched": part == "status",
-                "deadline_ns": 0,
-                "manual": False,
-            }
+            Claim(
+                kind,
+                f"{self._prefix}{part}",
+                interface.format(self._interface),
+                qos=ORDINARY._replace(latched=part == "status"),
+            )
             for kind, part, interface in services + topics
         ]
 

@@ -28,10 +28,11 @@ from .packages import (
     parse,
     start_of,
 )
+from .protocol import Note
 from .shadows import Shadows
 
-#: Sends a note to the grader: a code with its data.
-Notify = Callable[[dict[str, Any]], None]
+#: Sends a note to the grader.
+Notify = Callable[[Note], None]
 
 
 def path_of(request: Mapping[str, Any]) -> list[str]:
@@ -84,9 +85,8 @@ def run_file(request: Mapping[str, Any], notify: Notify, install_ros: Callable[[
     layout = _layout_of(request)
     start = start_of(root, file, layout, offers_main(tree), request.get("executable", ""), request.get("scripts", ()))
     shadows = shadows_of(request)
-    how = {"way": start.way, "module": start.module, "function": start.function}
     # Before any code of the file: how it was started is needed most if it then ends at once.
-    notify({"code": "started", **how, "hidden": shadows.files})
+    notify(Note("started", start.way, start.module, start.function, shadows.files))
     if shadows.files:
         shadows.fall(install_ros)
     # In front, as Python puts the folder of a script there: a file of the student's hides a module of Python.
@@ -164,7 +164,7 @@ def _find_neighbours(tree: ast.Module, path: str, notify: Notify) -> None:
     for name in sorted(_plain_imports(tree)):
         beside = os.path.isfile(os.path.join(folder, f"{name}.py"))
         if beside and name not in sys.modules and PathFinder.find_spec(name) is None:
-            notify({"code": "neighbour_imported", "module": name})
+            notify(Note("neighbour_imported", module=name))
     # At the end: packages that are installed come first, as they would under `ros2 run`.
     sys.path.append(folder)
 
@@ -184,13 +184,13 @@ def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, notify:
     # `main` before a class: it says how its author means the node to be run.
     main = namespace.get("main")
     if callable(main) and not _calls_at_top_level(tree.body, "main"):
-        notify({"code": "main_not_called"})
+        notify(Note("main_not_called"))
         main()
         return
     nodes = _node_classes(namespace)
     # With two, nobody knows which; and where there is a `main`, it was called above or by the file.
     if "main" not in namespace and len(nodes) == 1:
-        notify({"code": "class_not_started", "class": nodes[0].__name__})
+        notify(Note("class_not_started", class_name=nodes[0].__name__))
         if _needs_nothing(nodes[0]):
             spin(nodes[0])
 

@@ -9,7 +9,8 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator
 from types import FrameType, TracebackType
-from typing import Any
+
+from .protocol import FRAMES, ReportedFault
 
 #: Maximum length of a fault's text.
 TEXT_CHARACTERS = 500
@@ -44,19 +45,19 @@ class Describer:
         """Name files below the share folders of a prefix as those of a submission: by package and path."""
         self._folders = (*self._folders, os.path.join(prefix, "share", ""))
 
-    def exception(self, error: BaseException) -> dict[str, Any]:
+    def exception(self, error: BaseException) -> ReportedFault:
         """Convert an uncaught exception to a fault; of a chain, the first one that the program did not expect."""
         error = self._first(error)
         failed = graders_place(error, self._inside)
         if failed is not None:
             module, line = failed
-            return {"code": GRADERS, "type": _name_of(type(error)), "module": module, "at": line, **self._place([])}
+            return ReportedFault(GRADERS, _name_of(type(error)), module=module, at=line)
         if isinstance(error, SyntaxError) and self._is_of_file(error):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
         kind = _name_of(type(error))
         message = error.msg if isinstance(error, SyntaxError) else self.one_line(error)
-        return {"code": "exception", "type": kind, "message": _behind(kind, message), **self._place(frames)}
+        return self._placed(ReportedFault("exception", kind, _behind(kind, message)), frames)
 
     def _first(self, error: BaseException) -> BaseException:
         """Return the exception that began a chain.
@@ -100,31 +101,26 @@ class Describer:
             return type(error.lineno) in (int, type(None))
         return False
 
-    def syntax_error(self, error: SyntaxError) -> dict[str, Any]:
+    def syntax_error(self, error: SyntaxError) -> ReportedFault:
         """Convert the error of a file that cannot be compiled to a fault."""
         file = os.path.realpath(error.filename or "")
-        return {
-            "code": "syntax_error",
-            "type": type(error).__name__,
-            "message": str(error.msg)[:TEXT_CHARACTERS],
-            "python": list(sys.version_info[:2]),
-            "file": self._relative(file),
-            "line": error.lineno or 0,
-            "frames": [],
-        }
+        message = str(error.msg)[:TEXT_CHARACTERS]
+        kind, line = type(error).__name__, error.lineno or 0
+        return ReportedFault("syntax_error", kind, message, file=self._relative(file), line=line)
 
-    def stack(self, frame: FrameType | None, code: str) -> dict[str, Any]:
+    def stack(self, frame: FrameType | None, code: str) -> ReportedFault:
         """Return a fault with the current stack of a thread."""
         frames = []
         while frame is not None:
             frames.append((frame.f_code.co_filename, frame.f_lineno, frame.f_code.co_name))
             frame = frame.f_back
-        return {"code": code, **self._place(frames[::-1])}
+        return self._placed(ReportedFault(code), frames[::-1])
 
-    def _place(self, frames: list[tuple[str, int, str]]) -> dict[str, Any]:
+    def _placed(self, fault: ReportedFault, frames: list[tuple[str, int, str]]) -> ReportedFault:
+        """Return a fault with the student's own of some frames, outermost first."""
         own = [(self._relative(file), line, name) for file, line, name in frames if self._inside(file)]
         file, line, _ = own[-1] if own else ("", 0, "")
-        return {"file": file, "line": line, "frames": own[-20:]}
+        return fault._replace(file=file, line=line, frames=own[-FRAMES:])
 
     def _inside(self, file: str) -> bool:
         return os.path.realpath(file).startswith(self._root)

@@ -24,6 +24,7 @@ from typing import Any
 
 from . import launch_names
 from .launch_shares import Shares
+from .protocol import LaunchedNode, LeftOut
 
 #: The deepest nesting of included launch files.
 DEEPEST = 20
@@ -49,7 +50,7 @@ class LeftOutError(BaseException):
 
     def __init__(self, code: str, name: str = "", text: str = "") -> None:
         super().__init__(code)
-        self.told: dict[str, Any] = {"code": code, "name": name[:MOST_CHARACTERS], "text": text[:MOST_CHARACTERS]}
+        self.told = LeftOut(code, name[:MOST_CHARACTERS], text[:MOST_CHARACTERS])
         self.place = _written_at()
 
 
@@ -74,8 +75,8 @@ class Context:
         self.parameter_files: list[str] = []
         self.files: list[str] = []
         self.delay_s = 0.0
-        self.nodes: list[dict[str, Any]] = []
-        self.left_out: list[dict[str, Any]] = []
+        self.nodes: list[LaunchedNode] = []
+        self.left_out: list[LeftOut] = []
 
     def perform_substitution(self, value: Any) -> str:
         """Return the text of a substitution."""
@@ -92,15 +93,14 @@ class Context:
 
     def leave_out(self, file: str, line: int, error: LeftOutError) -> None:
         """Note something that is not evaluated; what is left out again at the same place is counted."""
-        told = {"file": file, "line": line, **error.told}
-        # All nodes that are too many make one note, wherever they were written.
-        same = ("code",) if error.told["code"] == "nodes" else tuple(told)
-        for one in self.left_out:
-            if all(one[key] == told[key] for key in same):
-                one["count"] += 1
+        told = error.told._replace(file=file, line=line)
+        for place, one in enumerate(self.left_out):
+            # All nodes that are too many make one note, wherever they were written.
+            if one.code == told.code if told.code == "nodes" else one._replace(times=told.times) == told:
+                self.left_out[place] = one._replace(times=one.times + 1)
                 return
         if len(self.left_out) < self.most_left_out:
-            self.left_out.append({**told, "count": 1})
+            self.left_out.append(told)
 
     def leave_out_here(self, error: LeftOutError) -> None:
         """Note something that is not evaluated, where the launch file is now."""
@@ -682,17 +682,17 @@ class Node(Action):
         ros = [part for rule in rules for part in ("-r", rule)] + [part for one in given for part in ("-p", one)]
         package = text_of(self.package, context) if self.package is not None else ""
         context.nodes.append(
-            {
-                "package": package,
-                "near": "" if package in context.packages else meant_by(package, context.packages),
-                "executable": text_of(self.executable, context),
-                "arguments": [text_of(one, context) for one in self.arguments],
-                "ros_arguments": [*ros, *(text_of(one, context) for one in self.ros_arguments)],
-                "parameter_files": texts,
-                "delay_s": context.delay_s,
-                "file": self.file,
-                "line": self.line,
-            }
+            LaunchedNode(
+                package,
+                "" if package in context.packages else meant_by(package, context.packages),
+                text_of(self.executable, context),
+                [text_of(one, context) for one in self.arguments],
+                [*ros, *(text_of(one, context) for one in self.ros_arguments)],
+                texts,
+                context.delay_s,
+                self.file,
+                self.line,
+            )
         )
         return ()
 
@@ -1243,7 +1243,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
     prefix: str = "",
     most_nodes: int,
     most_left_out: int,
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+) -> tuple[list[LaunchedNode], list[LeftOut]]:
     """Evaluate a launch file; raises whatever it raises.
 
     Args:
@@ -1256,8 +1256,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
         most_left_out: So many things are said to be left out.
 
     Returns:
-        The nodes, and what was left out with `code`, `name`, `text`, `count` and, if nothing was evaluated after it,
-        `ends`, each with `file` and `line`.
+        The nodes, and what was left out.
     """
     global _folders  # noqa: PLW0603  every action needs them, also those that a launch file makes at import
     _folders = tuple(os.path.join(folder, "") for folder in folders)
@@ -1284,7 +1283,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
 
 def _leave_out_all(context: Context, path: str, error: LeftOutError) -> None:
     """Note what ended the evaluation of a launch file."""
-    error.told["ends"] = True
+    error.told = error.told._replace(ends=True)
     file, line = error.place
     context.leave_out(file or os.path.basename(path), line, error)
 

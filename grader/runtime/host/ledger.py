@@ -10,7 +10,7 @@ import functools
 import math
 import weakref
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from rclpy.context import Context
@@ -28,6 +28,7 @@ from . import originals
 from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
 from .events import Events
 from .node_parts import context_of, declared_by, ends_of, full_name_of, handle_of, name_of, seen_by
+from .protocol import Claim, Counterparts, Qos
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -58,8 +59,6 @@ _CONTEXT_OK = Context.ok
 #: The kinds of endpoints of topics.
 ENDS_OF_TOPICS = ("publisher", "subscription")
 TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
-#: The QoS of a lifecycle state machine's publisher, which is not an rclpy publisher.
-_ORDINARY = {"reliable": True, "latched": False, "deadline_ns": 0, "manual": False, "lease_ns": 0}
 REAL_WAIT_SET: Any = _rclpy.WaitSet
 
 
@@ -260,10 +259,10 @@ class Ledger:
         self._endpoints[kind] = [reference for reference, _ in found]
         return [endpoint for _, endpoint in found]
 
-    def claims(self, domain: int) -> list[dict[str, Any]]:
-        """Return the claims: a description of every endpoint in a ROS domain, as plain JSON values."""
+    def claims(self, domain: int) -> list[Claim]:
+        """Return the claims: a description of everything in a ROS domain."""
         self.changed = self.removed = False
-        claims: list[dict[str, Any]] = []
+        claims: list[Claim] = []
         existing = self.nodes()
         seen = [node for node in existing if is_in(domain, node)]
         elsewhere = [end.handle for node in existing if node not in seen for end in ends_of(node)]
@@ -274,32 +273,26 @@ class Ledger:
             for endpoint in self.alive(kind):
                 if endpoint.topic_name in BACKGROUND or self.is_elsewhere(endpoint.handle):
                     continue
-                claims.append(
-                    {
-                        "kind": kind,
-                        "name": endpoint.topic_name,
-                        "type": type_name(endpoint.msg_type),
-                        "number": self.numbers[endpoint],
-                        **_qos(self._resolved.get(endpoint, endpoint.qos_profile), kind),
-                    }
-                )
+                qos = _qos(self._resolved.get(endpoint, endpoint.qos_profile), kind)
+                interface = type_name(endpoint.msg_type)
+                claims.append(Claim(kind, endpoint.topic_name, interface, self.numbers[endpoint], qos))
         claims += [
-            {
-                "kind": kind,
-                "name": service_name(endpoint),
-                "type": type_name(endpoint.srv_type),
-                "sends": _qos(endpoint.qos_profile, "publisher"),
-                "takes": _qos(endpoint.qos_profile, "subscription"),
-            }
+            Claim(
+                kind,
+                service_name(endpoint),
+                type_name(endpoint.srv_type),
+                sends=_qos(endpoint.qos_profile, "publisher"),
+                takes=_qos(endpoint.qos_profile, "subscription"),
+            )
             for kind in ("client", "service")
             for endpoint in self.alive(kind)
             if (kind == "client" or not _is_background(endpoint)) and not self.is_elsewhere(endpoint.handle)
         ]
         claims += [claim for end in self._actions for claim in end.claims()]
         nodes = [full_name_of(node) for node in seen]
-        claims += [{"kind": "node", "name": name, "type": ""} for name in nodes]
+        claims += [Claim("node", name, "") for name in nodes]
         claims += [
-            {**_ORDINARY, "kind": "publisher", "name": topic, "type": TRANSITION_EVENT}
+            Claim("publisher", topic, TRANSITION_EVENT)  # of a lifecycle state machine: no rclpy publisher
             for topic in self.transitions.values()
             if topic.rpartition("/")[0] in nodes
         ]
@@ -320,7 +313,7 @@ class Ledger:
         self.contexts.append(weakref.ref(context_of(node)))
         self.changed = True
 
-    def expect(self, arrivals: dict[str, int]) -> None:
+    def expect(self, arrivals: Mapping[str, int]) -> None:
         """Add messages that the grader has announced, and wait until they have arrived."""
         overflows = False
         for channel, count in arrivals.items():
@@ -422,13 +415,11 @@ class Ledger:
             for endpoint in self.alive(kind)
         }
 
-    def await_matches(self, expected: dict[str, dict[str, list[int]]], wait_s: float) -> list[str]:
+    def await_matches(self, expected: Counterparts, wait_s: float) -> list[str]:
         """Wait, in real time, until endpoints have the expected counterparts; return the names of those that do not.
 
         Args:
-            expected: Kind of endpoint -> name -> numbers of counterparts, one for each endpoint that has any. Under
-                `refused`, for the number of an endpoint, how many counterparts its QoS has not fitted so far. Under
-                `heard`, for a service, how many servers get the requests of a client that they cannot answer.
+            expected: The counterparts.
             wait_s: Time-out in seconds.
         """
         matched = originals.wait_until(lambda: not self._unmatched(expected), wait_s)
@@ -438,17 +429,17 @@ class Ledger:
             self._strangers.update(self._surplus(expected))
         return missing
 
-    def await_events(self, refused: dict[str, list[int]], wait_s: float) -> list[str]:
+    def await_events(self, refused: Mapping[str, int], wait_s: float) -> list[str]:
         """Wait, in real time, until the middleware has reported all counterparts, and let the program know.
 
         Args:
-            refused: What `await_matches` was given under this name.
+            refused: As `Counterparts.refused`.
             wait_s: Time-out in seconds.
 
         Returns:
             The names of the endpoints whose counterparts it has not all reported.
         """
-        most = {int(number): counts[0] for number, counts in refused.items()}
+        most = {int(number): count for number, count in refused.items()}
         told = originals.wait_until(lambda: not self._untold(most), wait_s)
         untold = [] if told else self._untold(most)
         self.events.tell()
@@ -469,7 +460,7 @@ class Ledger:
             )
         ]
 
-    def _surplus(self, expected: dict[str, dict[str, list[int]]]) -> dict[tuple[str, str], int]:
+    def _surplus(self, expected: Counterparts) -> dict[tuple[str, str], int]:
         """Count the counterparts, by kind and name, that neither the grader expects nor an earlier wait has found.
 
         A server that still sees a client that has left sends its response, which wakes all other clients.
@@ -480,8 +471,8 @@ class Ledger:
                 if endpoint.topic_name not in BACKGROUND:
                     over[kind, endpoint.topic_name] += _matches(kind, endpoint) or 0
         for kind, name in over:
-            over[kind, name] -= sum(expected.get(kind, {}).get(name, ()))
-        services = expected.get("service", {})
+            over[kind, name] -= sum(getattr(expected, kind).get(name, ()))
+        services = expected.service
         for name in self._served():
             over["service", name] = (self._clients_of(name) or 0) - max(services.get(name, ()), default=0)
         return {key: count for key, count in over.items() if count > self._strangers.get(key, 0)}
@@ -492,32 +483,33 @@ class Ledger:
         of_actions = (name for end in self._actions if end.kind == "service" for name in end.services())
         return {*map(service_name, servers), *of_actions}
 
-    def await_absence(self, services: list[str], wait_s: float) -> None:
+    def await_absence(self, services: Sequence[str], wait_s: float) -> None:
         """Wait, in real time, until clients see that the servers of some services are gone."""
         clients = [client for client in self.alive("client") if service_name(client) in services]
         originals.wait_until(lambda: not any(_matches("client", client) for client in clients), wait_s)
 
-    def _unmatched(self, expected: dict[str, dict[str, list[int]]]) -> list[str]:
+    def _unmatched(self, expected: Counterparts) -> list[str]:
         missing = []
-        if "graph" in expected and self._graph() not in (None, expected["graph"]):
+        if expected.graph is not None and self._graph() not in (None, expected.graph):
             missing.append("graph")
         missing += [
             f"client {service}"
-            for service, (count,) in expected.get("heard", {}).items()
+            for service, count in expected.heard.items()
             if (servers := self._servers_of(service)) is not None and servers < count
         ]
-        for kind, names in expected.items():
+        for kind in self._endpoints:
+            names: Mapping[str, Sequence[int]] = getattr(expected, kind)
             found: dict[str, list[float]] = {}
-            for endpoint in self.alive(kind) if kind in self._endpoints else ():
+            for endpoint in self.alive(kind) if names else ():
                 name = endpoint.topic_name if kind in ENDS_OF_TOPICS else service_name(endpoint)
                 if name in names:
                     has = self._clients_of(name) if kind == "service" else _matches(kind, endpoint)
                     found.setdefault(name, []).append(math.inf if has is None else has)
-            for end in self._actions if kind == "client" else ():
+            for end in self._actions if names and kind == "client" else ():
                 if end.kind == kind and names.keys() & set(end.services()):
                     served = _asked(functools.partial(HAS_SERVER, end.handle))
                     found.setdefault(end.services()[0], []).append(math.inf if served is None else served)
-            for end in self._actions if kind == "service" else ():
+            for end in self._actions if names and kind == "service" else ():
                 for name in names.keys() & set(end.services()) if end.kind == kind else ():
                     asking = self._clients_of(name)
                     found.setdefault(name, []).append(math.inf if asking is None else asking)
@@ -527,7 +519,7 @@ class Ledger:
                     missing.append(f"{kind} {name}")
         return missing
 
-    def _graph(self) -> dict[str, list[int]] | None:
+    def _graph(self) -> dict[str, int] | None:
         """Count the graph as the newest node sees it, in the same way as the grader does; None without a node."""
         node = self._node()
         if node is None:
@@ -545,7 +537,7 @@ class Ledger:
                 if not types[0].startswith(BACKGROUND_SERVICES):
                     found[f"service {service}"] = handle.get_count_services(service)
                     found[f"client {service}"] = handle.get_count_clients(service)
-        return {name: [count] for name, count in found.items() if count}
+        return {name: count for name, count in found.items() if count}
 
     def _clients_of(self, service: str) -> int | None:
         """Return how many clients of a service this process sees; None without a node to ask."""
@@ -602,11 +594,11 @@ def _is_valid(handle: Any) -> bool:
         return False
 
 
-def parameters_of(node: Any) -> list[dict[str, str]]:
+def parameters_of(node: Any) -> list[Claim]:
     """Return the parameters that a node has declared, without those that every node has."""
     own = full_name_of(node)
     return [
-        {"kind": "parameter", "name": f"{own}:{name}", "type": repr(parameter.value)[:200]}
+        Claim("parameter", f"{own}:{name}", repr(parameter.value)[:200])
         for name, parameter in sorted(declared_by(node).items())
         if name not in BACKGROUND_PARAMETERS
     ]
@@ -625,7 +617,7 @@ def _channel(receiver: Any) -> str:
 
 def is_latched(publisher: Any) -> bool:
     """Return whether who discovers a publisher later gets its last messages as well."""
-    return bool(_qos(publisher.qos_profile, "publisher")["latched"])
+    return _qos(publisher.qos_profile, "publisher").latched
 
 
 def asks_for_best(values: Iterable[Any]) -> bool:
@@ -641,7 +633,7 @@ def asks_for_best(values: Iterable[Any]) -> bool:
     )
 
 
-def _qos(qos: Any, kind: str) -> dict[str, Any]:
+def _qos(qos: Any, kind: str) -> Qos:
     """Describe the QoS of a publisher or subscription, as far as it decides who is matched."""
     writes = kind == "publisher"
     # a service that asks for what is best gets the usual
@@ -652,13 +644,13 @@ def _qos(qos: Any, kind: str) -> dict[str, Any]:
         reliable = writes
     if qos.durability in (DurabilityPolicy.SYSTEM_DEFAULT, DurabilityPolicy.UNKNOWN):
         latched = writes
-    return {
-        "reliable": reliable,
-        "latched": latched,
-        "deadline_ns": finite_ns(qos.deadline),
-        "manual": qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC,
-        "lease_ns": finite_ns(qos.liveliness_lease_duration),
-    }
+    return Qos(
+        reliable,
+        latched,
+        finite_ns(qos.deadline),
+        manual=qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC,
+        lease_ns=finite_ns(qos.liveliness_lease_duration),
+    )
 
 
 def finite_ns(duration: Any) -> int:

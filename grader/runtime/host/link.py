@@ -1,16 +1,15 @@
 """The channels to the grader: JSON lines over an inherited socket, and log records marked by a token.
 
-On the socket the host sends a report, and the grader answers.
+On the socket the host sends a report, and the grader answers; see `protocol`.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import socket
-from typing import Any
 
 from . import originals
+from .protocol import Answer, Report, answer_of, line_of
 
 #: The most that is read at once.
 ANSWER_BYTES = 1 << 16
@@ -32,9 +31,9 @@ class Link:
         self._socket = socket.socket(fileno=descriptor)
         self._socket.settimeout(None)
 
-    def send(self, report: dict[str, Any]) -> None:
+    def send(self, report: Report) -> None:
         """Send one report; raises OSError if the grader is gone, which ends the process."""
-        line = json.dumps(report).encode() + b"\n"
+        line = line_of(report)
         with self._sending:
             if not self._cut:
                 self._socket.sendall(line)
@@ -48,12 +47,12 @@ class Link:
         self._cut = True
         self._socket.close()
 
-    def ask(self, report: dict[str, Any]) -> dict[str, Any]:
+    def ask(self, report: Report) -> Answer:
         """Send one report and return the answer; raises ConnectionError if the grader is gone."""
         self.send(report)
         return self.next_answer()
 
-    def next_answer(self) -> dict[str, Any]:
+    def next_answer(self) -> Answer:
         """Wait for the grader's next answer; raises ConnectionError if the grader is gone."""
         while b"\n" not in self._received:
             received = self._socket.recv(ANSWER_BYTES)
@@ -61,8 +60,7 @@ class Link:
                 raise ConnectionError("the grader is gone")
             self._received += received
         line, _, self._received = self._received.partition(b"\n")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
+        return answer_of(line)
 
 
 class Log:

@@ -20,6 +20,7 @@ from . import closures, entry, launch_files, machine, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_events
+from .protocol import Exited, Go, Launched, Ready, ReportedFault, ThreadFault, Written
 from .quick_imports import import_without_needless
 from .replaced import guard_methods, hide_frames, rename_functions, without_own_frames
 from .shadows import ROS_PARTS, Around
@@ -88,7 +89,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     describer.set_root(request["root"])
     die_with_parent()
     log = Log(request["log_format"])
-    ready = {"kind": "ready", "log_token": log.token}
+    ready = Ready(log.token)
 
     # A fork has imported rclpy already; one whose submission hides a module of it is executed instead.
     hidden = not prepared and hides_modules(request)
@@ -110,13 +111,14 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     # From here on the worker decides when the program runs.
     start = link.ask(ready)
     # The token is known to the logging library and the worker alone; the program could find this value.
-    ready.clear()
+    del ready
+    assert isinstance(start, Go)
     if isinstance(time, VirtualTime):
         if request["drawn_order"]:
             time.order.begin(request["seed"])
-        time.start(start["now_ns"], request["steady_ns"], charged=request["charged"])
+        time.start(start.now_ns, request["steady_ns"], charged=request["charged"])
     else:
-        time.start(start["now_ns"], request["steady_ns"])
+        time.start(start.now_ns, request["steady_ns"])
     watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()
@@ -140,22 +142,23 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
         IMPORTS.hide()
     ending = play(request, describer, link, install_ros)
     try:
-        ending |= clean_up(request["root"], time, watchdog)
+        ending = clean_up(ending, request["root"], time, watchdog)
     except Exception as error:  # no code of the student runs there that could raise
-        ending = {"fault": describer.exception(error), **ending, "code": 1, "left": False}
+        ending = ending._replace(fault=ending.fault or describer.exception(error), code=1)
     # Before the report: the worker reads what was written until then as the program's last words.
     flush()
     with contextlib.suppress(Exception):
         if found := written.files():
-            link.send({"kind": "written", "files": found})
-    link.send({"kind": "exited", **ending})
+            link.send(Written(found))
+    link.send(ending)
     originals.exit_now(0)
 
 
-def clean_up(root: str, time: VirtualTime | WallTime, watchdog: Watchdog | None) -> dict[str, Any]:
-    """Do what the interpreter does after the end of a program, and return what the last report says of it.
+def clean_up(ending: Exited, root: str, time: VirtualTime | WallTime, watchdog: Watchdog | None) -> Exited:
+    """Do what the interpreter does after the end of a program, and return the last report with what it says of it.
 
     Args:
+        ending: The last report so far.
         root: The submission's folder.
         time: The clock.
         watchdog: Stopped, because nothing can hang any more.
@@ -169,7 +172,7 @@ def clean_up(root: str, time: VirtualTime | WallTime, watchdog: Watchdog | None)
     if watchdog is not None:
         watchdog.stop()
     # After the modules: a `__del__` may still publish, and what it sends has to arrive.
-    return {"left": time.end(), **time.summary()}
+    return ending._replace(left=time.end(), progress=time.progress())
 
 
 def evaluate(request: dict[str, Any]) -> None:
@@ -185,7 +188,7 @@ def evaluate(request: dict[str, Any]) -> None:
     link.open(request["fd"])
     describer.set_root(request["root"])
     die_with_parent()
-    link.ask({"kind": "ready"})
+    link.ask(Ready())
     root, told = request["root"], request["launch"]
     own = os.path.join(os.environ.get("HOME") or tempfile.gettempdir(), "provided")
     installed = os.path.join(os.path.dirname(own), "installed")
@@ -194,7 +197,6 @@ def evaluate(request: dict[str, Any]) -> None:
         with open(os.path.join(own, name), "w", encoding="utf-8") as file:
             file.write(text)
     here = own if request["file"] in dict(told["provided"]) else root
-    found: dict[str, Any] = {}
     try:
         path = os.path.join(here, request["file"])
         sys.argv = [path]
@@ -205,19 +207,19 @@ def evaluate(request: dict[str, Any]) -> None:
         describer.hide(installed)
         folders = (root, own)
         nodes, left_out = launch_files.describe(folders, path, packages, arguments, prefix=installed, **told["most"])
-        found = {"nodes": nodes, "left_out": left_out}
+        found = Launched(nodes, left_out)
     except BaseException as error:  # whatever the launch file raises becomes a fault
-        found = {"fault": describer.exception(error)}
+        found = Launched(fault=describer.exception(error))
     flush()
-    link.send({"kind": "launched", **found})
+    link.send(found)
     originals.exit_now(0)
 
 
 def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | WallTime:
     """Create the clock that a scenario runs on."""
 
-    def report(fault: dict[str, Any]) -> None:
-        link.send({"kind": "fault", "fault": fault})
+    def report(fault: ReportedFault) -> None:
+        link.send(ThreadFault(fault))
 
     if clock == "virtual":
         time = VirtualTime(link)
@@ -237,18 +239,18 @@ def die_with_parent() -> None:
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG, linux/prctl.h
 
 
-def play(request: dict[str, Any], describer: Describer, link: Link, install_ros: Callable[[], None]) -> dict[str, Any]:
-    """Run the file and the interpreter's exit handlers; return how it ended as `code`, and `fault` if there is one."""
-    ending: dict[str, Any] = {"code": 0}
+def play(request: dict[str, Any], describer: Describer, link: Link, install_ros: Callable[[], None]) -> Exited:
+    """Run the file and the interpreter's exit handlers; return how it ended."""
+    ending = Exited(code=0)
     try:
-        at_depth(lambda: entry.run_file(request, lambda note: link.send({"kind": "note", **note}), install_ros))
+        at_depth(lambda: entry.run_file(request, link.send, install_ros))
     except SystemExit as leaving:
-        ending["code"] = exit_code(leaving)
+        ending = Exited(code=exit_code(leaving))
     # Ctrl-C without a handler ends Python with 130, 128 and the number of the signal.
     except KeyboardInterrupt:
-        ending["code"] = 130
+        ending = Exited(code=130)
     except BaseException as error:  # whatever the student's code raises becomes a fault
-        ending = {"code": 1, "fault": describer.exception(error)}
+        ending = Exited(code=1, fault=describer.exception(error))
         # What the program prints about its own end is what it would print without the host.
         BaseException.with_traceback(error, of_program(error.__traceback__))
         without_own_frames(error)

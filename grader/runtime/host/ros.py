@@ -42,6 +42,7 @@ from .clock import VirtualClock
 from .ledger import BACKGROUND, ENDS_OF_TOPICS, REAL_WAIT_SET, Ledger, asks_for_best, finite_ns, service_name
 from .node_parts import context_of, full_name_of
 from .order import ReadyOrder
+from .protocol import Note
 from .scheduler import Scheduler
 
 #: The kinds of entities in a wait set, in the order of the counts that it is made with.
@@ -805,7 +806,7 @@ def note_nodes(note: Callable[[Any], None] = lambda _: None) -> None:
     rclpy.node.Node.__init__ = functools.wraps(create)(make_node)
 
 
-def note_other_domains(domain: Callable[[], int], tell: Callable[[dict[str, Any]], None]) -> None:
+def note_other_domains(domain: Callable[[], int], tell: Callable[[Note], None]) -> None:
     """Report the first node in each ROS domain but the grader's, which sees nothing of it.
 
     Args:
@@ -819,7 +820,7 @@ def note_other_domains(domain: Callable[[], int], tell: Callable[[dict[str, Any]
             found = context_of(node).get_domain_id()
             if found != domain() and found not in told:
                 told.add(found)
-                tell({"code": "other_domain", "node": full_name_of(node), "domain": found})
+                tell(Note("other_domain", node=full_name_of(node), domain=found))
 
     ON_NODES.append(note)
 

@@ -12,6 +12,7 @@ from . import originals, threads, times
 from .clock import VirtualClock
 from .link import Link
 from .order import ReadyOrder
+from .protocol import Answer, Arrived, AwaitMatches, Expect, Go, Idle, Matched, Progress, ReportedFault, Stop
 from .replaced import as_builtin
 from .scheduler import GreenThread, Scheduler
 
@@ -98,7 +99,7 @@ class VirtualTime:
         self.give_up_outside: Callable[[str], None] = lambda reason: None
 
     def install(
-        self, describe: Callable[[BaseException], dict[str, Any]], report: Callable[[dict[str, Any]], None]
+        self, describe: Callable[[BaseException], ReportedFault], report: Callable[[ReportedFault], None]
     ) -> None:
         """Make the threads, locks, selectors and clocks of this process virtual.
 
@@ -133,7 +134,7 @@ class VirtualTime:
             lambda: self._worked_ns + self._real.processor_ns() - self.resumed_ns,
         )
         ros.install_events_executor(lambda: self.give_up_outside("events_executor"))
-        ros.note_other_domains(lambda: self._domain, lambda note: self._link.send({"kind": "note", **note}))
+        ros.note_other_domains(lambda: self._domain, self._link.send)
         ros.install_looks(self.clock, self._ledger, self._settle)
         ros.install_own_signals(self._await_shutdown)
         ros.install_callers()
@@ -178,37 +179,30 @@ class VirtualTime:
         self._move_to(now_ns)
         self.resumed_ns = self._real.processor_ns()
 
-    def summary(self) -> dict[str, Any]:
+    def progress(self) -> Progress:
         """Return the common part of reports: the time, and what has happened since the last one, if anything has."""
         self.unreported = False
-        report: dict[str, Any] = {"now_ns": self.clock.now_ns}
-        if self.clock.paused:
-            report["paused"] = True
-        if self.clock.counted:
-            report["counted"] = True
-        if self._moved:
-            report["moved"] = self._moved
-        if self._charges:
-            report["charged"] = True
-        if self.scheduler.others_ran():
-            report["threads"] = True
+        found = Progress(
+            now_ns=self.clock.now_ns,
+            paused=self.clock.paused,
+            counted=self.clock.counted,
+            moved=self._moved,
+            charged=self._charges,
+            threads=self.scheduler.others_ran(),
+        )
         self._charges = False
         self.clock.paused = self.clock.counted = False
         self._moved = 0
-        if self._ledger is not None:
-            if self._ledger.sent:
-                report["sent"] = dict(self._ledger.sent)
-                self._ledger.sent.clear()
-            if early := +self._ledger.early:
-                report["early"] = dict(early)
-            self._ledger.early.clear()
-            if self._ledger.lost:
-                report["lost"] = dict(self._ledger.lost)
-                self._ledger.lost.clear()
-            if self._ledger.changed and not (self._ledger.sending_and_removed or self._finishing):
-                report["endpoints"] = self._ledger.claims(self._domain)
-                report["sees_graph"] = self._ledger.sees_graph
-        return report
+        return found if self._ledger is None else self._with_traffic(found, self._ledger)
+
+    def _with_traffic(self, found: Progress, ledger: Ledger) -> Progress:
+        """Add what was sent and lost, and the endpoints if they have changed."""
+        found = found._replace(sent=dict(ledger.sent), early=dict(+ledger.early), lost=dict(ledger.lost))
+        for counted in (ledger.sent, ledger.early, ledger.lost):
+            counted.clear()
+        if ledger.changed and not (ledger.sending_and_removed or self._finishing):
+            found = found._replace(endpoints=ledger.claims(self._domain), sees_graph=ledger.sees_graph)
+        return found
 
     def _ask_for_time(self, wake_ns: int | None) -> None:
         self.has_blocked = True
@@ -286,7 +280,7 @@ class VirtualTime:
             return
         if self._ledger is not None and self._ledger.sending_and_removed and not leaving:
             self.leave()  # endpoints that were freed in the meantime may only be destroyed now
-        report = {"kind": "idle", "wake_ns": wake_ns, **self.summary(), **({"leaving": True} if leaving else {})}
+        report = Idle(self.progress(), wake_ns, leaving)
         before_ns, done_ns = self.clock.now_ns, 0 if self._work is None else self._work.done_ns()
         self.running = False
         self._worked_ns += self._real.processor_ns() - self.resumed_ns
@@ -295,39 +289,40 @@ class VirtualTime:
         self.running = True
         if leaving and self._ledger is not None:
             self._ledger.settled()
-        if answer.get("stop"):
+        if isinstance(answer, Stop):
             self._stopping = True
             self._end_ns = self.clock.now_ns + STOPPING_NS
             self._real.kill(os.getpid(), signal.SIGINT)
             return
-        self._move_to(answer["now_ns"])
-        self._free_until_ns = answer["free_until_ns"]
-        if self._ledger is not None and answer.get("arrivals"):
+        self._move_to(answer.now_ns)
+        self._free_until_ns = answer.free_until_ns
+        if self._ledger is not None and answer.arrivals:
             self.clock.busy()  # a busy loop polls what has arrived before it lets time pass again
             began_s = self._real.perf_counter()
-            self._ledger.expect(answer["arrivals"])
+            self._ledger.expect(answer.arrivals)
             if self._real.perf_counter() - began_s > QUICK_S:  # until then, the grader counts it as the program's work
-                self._link.send({"kind": "arrived"})
+                self._link.send(Arrived())
         if self._work is not None:  # what was done at this instant is still to be counted
             self._work.restart(FREE_NS if self.clock.now_ns > before_ns else -done_ns)
-        if answer.get("interrupt"):
+        if answer.interrupt:
             self._interrupt()
 
-    def _answered(self, report: dict[str, Any]) -> dict[str, Any]:
+    def _answered(self, report: Idle) -> Go | Stop:
         """Send a report and return the answer; handle the grader's requests to wait for matches or messages first."""
-        answer = self._link.ask(report)
-        while self._ledger is not None:
-            if "match" in answer:
-                missing = self._ledger.await_matches(answer["match"], answer["wait_s"])
-                self._ledger.await_absence(answer.get("gone", []), answer["wait_s"])
-                untold = self._ledger.await_events(answer["match"].get("refused", {}), answer["wait_s"])
-                answer = self._link.ask({"kind": "matched", "missing": missing, "untold": untold})
-            elif "expect" in answer:
-                self._ledger.expect(answer["expect"])
-                answer = self._link.ask({"kind": "arrived"})
-            else:
-                break
+        answer: Answer = self._link.ask(report)
+        while not isinstance(answer, (Go, Stop)):
+            answer = self._link.ask(self._waited(answer))
         return answer
+
+    def _waited(self, answer: Expect | AwaitMatches) -> Arrived | Matched:
+        """Wait as the grader says, and report it."""
+        assert self._ledger is not None  # who has no endpoints is never told to wait
+        if isinstance(answer, Expect):
+            self._ledger.expect(answer.arrivals)
+            return Arrived()
+        missing = self._ledger.await_matches(answer.expected, answer.wait_s)
+        self._ledger.await_absence(answer.gone, answer.wait_s)
+        return Matched(missing, self._ledger.await_events(answer.expected.refused, answer.wait_s))
 
     def _interrupt(self) -> None:
         """Receive the stop signal as from Ctrl-C, while the grader keeps control of time.

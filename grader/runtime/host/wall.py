@@ -16,6 +16,7 @@ from typing import Any
 
 from . import originals
 from .link import Link
+from .protocol import Claim, EarlyMessage, Parameters, Progress
 
 #: How long, in real time, new publishers wait for the grader's subscriptions, and how the name of the grader's node
 #: begins.
@@ -139,7 +140,7 @@ class WallTime:
         rclpy.client.Client.call_async = noting(rclpy.client.Client.call_async)
         rclpy.service.Service.send_response = noting(rclpy.service.Service.send_response)
         ros.note_nodes()
-        ros.note_other_domains(lambda: self.domain, lambda note: self._link.send({"kind": "note", **note}))
+        ros.note_other_domains(lambda: self.domain, self._link.send)
         ros.install_departures(self._leave, self._leave)
 
     def _await_watched(self) -> None:
@@ -214,11 +215,11 @@ class WallTime:
         if now == self._reported:
             return
         self._reported = now
-        claims: list[dict[str, str]] = []
+        claims: list[Claim] = []
         for node in nodes:
             with contextlib.suppress(Exception):  # it is being destroyed
                 claims += parameters_of(node)
-        self._link.send({"kind": "parameters", "claims": claims[:MOST_PARAMETERS]})
+        self._link.send(Parameters(claims[:MOST_PARAMETERS]))
 
     def report_early(self, topic: str, began_ns: int) -> None:
         """Report that what was sent on a topic was sent before anybody could have discovered its publisher.
@@ -229,7 +230,7 @@ class WallTime:
         """
         if self._early_reports < MOST_EARLY:
             self._early_reports += 1
-            self._link.send({"kind": "early", "topic": topic, "began_ns": began_ns, "ended_ns": originals.time_ns()})
+            self._link.send(EarlyMessage(topic, began_ns, originals.time_ns()))
 
     def _leave(self) -> None:
         """Wait until published messages have arrived, since they are lost when their publisher is destroyed."""
@@ -261,9 +262,9 @@ class WallTime:
         self._link.next_answer()
         originals.kill(os.getpid(), signal.SIGINT)
 
-    def summary(self) -> dict[str, Any]:
-        """Return the additional fields of the last report: none."""
-        return {}
+    def progress(self) -> Progress:
+        """Return what is said of the program's progress in the last report: nothing."""
+        return Progress()
 
 
 def _is_watched(node: Any, publisher: Any) -> bool:

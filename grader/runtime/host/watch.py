@@ -14,6 +14,7 @@ from typing import Any
 
 from . import machine
 from .link import Link
+from .protocol import Reached
 
 #: Prefixes of event names from https://docs.python.org/3/library/audit_events.html.
 EVENTS = (
@@ -95,7 +96,7 @@ class Watch:
     def _tell(self, what: str) -> None:
         if self._link.is_free():
             self._told.add(what)
-            self._link.send({"kind": "reached", "what": what})
+            self._link.send(Reached(what))
 
     def _is_unread(self, arguments: tuple[Any, ...], frame: FrameType) -> bool:
         """Return whether an import runs code that comes neither from a source of the submission nor an installed one.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from . import originals
 from .faults import Describer
 from .link import Link
+from .protocol import Exited
 
 if TYPE_CHECKING:
     from .virtual import VirtualTime
@@ -82,7 +83,6 @@ class Watchdog:
         if self._stopped or not self._time.running:
             return
         frame = sys._current_frames().get(self._time.scheduler.running_thread() or -1)
-        fault: dict[str, Any] = self._describer.stack(frame, code)
-        report = {"kind": "exited", "code": None, "fault": fault, "unsettled": unsettled}
-        self._link.send({**report, **self._time.summary()})
+        fault = self._describer.stack(frame, code)
+        self._link.send(Exited(self._time.progress(), fault=fault, unsettled=unsettled))
         originals.exit_now(70)

@@ -9,10 +9,11 @@ import io
 import os
 import stat
 from collections.abc import Iterator
-from typing import Any
 
-#: How many files are kept, and the most bytes of one and of all; more entries than these are not looked at.
-FILES, FILE_BYTES, ALL_BYTES, ENTRIES = 20, 64 << 10, 256 << 10, 2_000
+from .protocol import MOST_WRITTEN, WrittenContent
+
+#: The most bytes of one file that is kept, and of all; more entries than these are not looked at.
+FILE_BYTES, ALL_BYTES, ENTRIES = 64 << 10, 256 << 10, 2_000
 
 
 class WrittenFiles:
@@ -28,20 +29,20 @@ class WrittenFiles:
         self._left_out = left_out
         self._before = {path: state for _, path, state in self._entries()}
 
-    def files(self) -> list[dict[str, Any]]:
-        """Return the files that are new or changed, with their names, sizes in bytes, and contents in base64.
+    def files(self) -> list[WrittenContent]:
+        """Return the files that are new or changed, with their names and contents.
 
         A name is relative to the first of the folders that the file is in. Links are not followed.
         """
-        found: list[dict[str, Any]] = []
+        found: list[WrittenContent] = []
         left = ALL_BYTES
         for name, path, state in sorted(self._entries()):
-            if self._before.get(path) == state or state[0] > min(FILE_BYTES, left) or len(found) == FILES:
+            if self._before.get(path) == state or state[0] > min(FILE_BYTES, left) or len(found) == MOST_WRITTEN:
                 continue
             with contextlib.suppress(OSError):
                 content = _content(path)
                 left -= len(content)
-                found.append({"name": name, "content": base64.b64encode(content).decode()})
+                found.append(WrittenContent(name, base64.b64encode(content).decode()))
         return found
 
     def _entries(self) -> Iterator[tuple[str, str, tuple[int, int]]]:

@@ -6,11 +6,11 @@ import contextlib
 import os
 import signal
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from grader.runtime.host.packages import ENTRY_POINT, import_folders, layout_of, start_of
+from grader.runtime.host.protocol import Answer, Exited, Report, Stop
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.submission import Beginning
 from grader.runtime.model.trace import LogRecord, OutputLine
@@ -133,13 +133,13 @@ class BareProcess(NodeProcess):
     unused_end: socket.socket | None = None
     _told_end = False
 
-    def tell(self, answer: Mapping[str, Any]) -> None:
+    def tell(self, answer: Answer) -> None:
         """Send SIGINT if the answer is to stop; drop any other answer, since no host would read it."""
-        if answer.get("stop") and not self._has_ended():
+        if isinstance(answer, Stop) and not self._has_ended():
             with contextlib.suppress(OSError):
                 os.kill(self._program(), signal.SIGINT)
 
-    def reports(self) -> list[dict[str, Any] | None]:
+    def reports(self) -> list[Report | None]:
         """Report the end of the process once; None stands for an end by a signal or a limit."""
         if self._told_end or not self._has_ended():
             return []
@@ -148,9 +148,8 @@ class BareProcess(NodeProcess):
         code = self.process.wait()
         if self.stopped or not (0 <= code <= 128 or code in (INTERRUPTED, -signal.SIGINT)):
             return [None]
-        report: dict[str, Any] = {"kind": "exited", "code": INTERRUPTED if code == -signal.SIGINT else code}
         fault = last_traceback(self._last.decode("utf-8", "backslashreplace"), self.root) if code == 1 else None
-        return [{**report, "fault": fault} if fault else report]
+        return [Exited(code=INTERRUPTED if code == -signal.SIGINT else code, fault=fault)]
 
     def close(self) -> None:
         """Close the file descriptors of a process that has ended."""

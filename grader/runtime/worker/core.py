@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
+from grader.runtime.host.protocol import NO_COUNTERPARTS, Claim, Counterparts
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Event
@@ -39,7 +40,7 @@ class Process:
         name: The wanted file name, which identifies the process in traces.
         wake_ns: When it next wants to run, in nanoseconds of virtual time, or None.
         claims: Its endpoints, as it reports them.
-        told: The counterparts that it has to wait for: kind of endpoint -> name -> numbers of them.
+        told: The counterparts that it has to wait for.
         renewed: Whether it has reported its endpoints since then.
         sees_graph: Whether its program queries the graph, as it reports.
         arrivals: Messages that are on their way to it and not yet announced to it, by channel.
@@ -51,8 +52,8 @@ class Process:
 
     name: str
     wake_ns: int | None = field(default=None, kw_only=True)
-    claims: list[dict[str, Any]] = field(default_factory=list, kw_only=True)
-    told: dict[str, dict[str, list[int]]] = field(default_factory=dict, kw_only=True)
+    claims: list[Claim] = field(default_factory=list, kw_only=True)
+    told: Counterparts = field(default=NO_COUNTERPARTS, kw_only=True)
     renewed: bool = field(default=False, kw_only=True)
     sees_graph: bool = field(default=False, kw_only=True)
     arrivals: dict[str, int] = field(default_factory=dict, kw_only=True)
@@ -329,12 +330,12 @@ class Core(Generic[P]):
         """Note that a process has ended, and its endpoints with it."""
         process.ended, process.wake_ns, process.claims = True, None, []
 
-    def has(self, process: P, claims: list[dict[str, Any]]) -> None:
+    def has(self, process: P, claims: list[Claim]) -> None:
         """Note which endpoints a process has: all of them, because it reports all of them each time."""
         process.claims, process.renewed = claims, True
         for claim in claims:
-            if claim["kind"] == "publisher":
-                self._appeared_ns.setdefault((process.name, claim.get("number", 0)), self.now_ns)
+            if claim.kind == "publisher":
+                self._appeared_ns.setdefault((process.name, claim.number), self.now_ns)
 
     def sent(self, sender: P, counts: Mapping[str, int]) -> None:
         """Announce what a process has sent, by channel, to every process that receives it."""
@@ -342,16 +343,14 @@ class Core(Generic[P]):
             kind, _, name = channel.partition(" ")
             if kind == "topic":
                 writers = ends_of(sender.claims, "publisher", name)
-                self.kept[sender.name, name] += count if any(w["latched"] for w in writers) else 0
+                self.kept[sender.name, name] += count if any(w.qos.latched for w in writers) else 0
                 for process in self.processes:
                     if any(compatible(w, r) for w in writers for r in readers_of(process.claims, name)):
                         announce(process, channel, count)
             elif kind in ("request", "response"):
                 self.exchanged(kind, name, count, senders(sender, channel))
 
-    def exchanged(
-        self, kind: str, service: str, count: int, ends: Sequence[Mapping[str, Any]] = (ORDINARY_END,)
-    ) -> None:
+    def exchanged(self, kind: str, service: str, count: int, ends: Sequence[Claim] = (ORDINARY_END,)) -> None:
         """Announce requests to servers, or responses to clients: every client of a service receives all responses."""
         for process in self.processes:
             own = ends_of(process.claims, "service" if kind == "request" else "client", service)
@@ -377,7 +376,7 @@ class Core(Generic[P]):
     def is_new(self, process: P, topic: str) -> bool:
         """Return whether a process has a publisher on a topic that has appeared at this instant."""
         publishers = ends_of(process.claims, "publisher", topic)
-        return any(self._appeared_ns.get((process.name, c.get("number", 0))) == self.now_ns for c in publishers)
+        return any(self._appeared_ns.get((process.name, c.number)) == self.now_ns for c in publishers)
 
     def is_on_its_way(self, channel: str) -> bool:
         """Return whether messages of a channel are on their way to any process."""
@@ -390,7 +389,7 @@ def announce(process: Process, channel: str, count: int) -> None:
         process.arrivals[channel] = process.arrivals.get(channel, 0) + count
 
 
-def senders(process: Process, channel: str) -> Sequence[Mapping[str, Any]]:
+def senders(process: Process, channel: str) -> Sequence[Claim]:
     """Return the ends of a service with which a process sends on a channel."""
     kind, _, service = channel.partition(" ")
     return ends_of(process.claims, "client" if kind == "request" else "service", service) or (ORDINARY_END,)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
+from grader.runtime.host.protocol import Progress
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
 
@@ -132,28 +130,24 @@ class Delay:
             self._total_ns += max(0, real_ns)
 
     def step(
-        self, taken_ns: int, report: Mapping[str, Any], passed_ns: int, *, forgiven_ns: int = 0, moved_on: bool = False
+        self, taken_ns: int, progress: Progress, passed_ns: int, *, forgiven_ns: int = 0, moved_on: bool = False
     ) -> None:
         """Add a step, from an answer to the report that the process waits or has ended.
 
         Args:
             taken_ns: What it has cost, without the time that was forgiven.
-            report: `paused`: whether a pause or a timer's period began in this step; `counted`: whether one did after
-                no look at a clock; `moved`: the number of pauses or polls in the step; `charged`: whether the process
-                waits for as long as it has worked.
+            progress: What the process reports of the step.
             passed_ns: The virtual time that has passed in the step; it bounds the number of polls.
             forgiven_ns: How long it waited for messages that were on their way to it.
             moved_on: Whether virtual time has passed since the step before.
         """
-        moved = report.get("moved")
         # The process reports this number: it is worth no more than the time that has passed allows.
-        moves = min(max(moved, 0), MOST_POLLS, passed_ns // YIELD_NS) if isinstance(moved, int) else 0
+        moves = min(max(progress.moved, 0), MOST_POLLS, passed_ns // YIELD_NS)
         self.work(max(0, taken_ns - POLL_NS * moves))
         waited_ns = max(0, forgiven_ns - ARRIVAL_FREE_NS)
         self.take(taken_ns + waited_ns - (POSSIBLE.step_ns if moved_on else 0))
-        if (report.get("paused") or report.get("counted")) and not report.get("charged"):
-            pauses = min(max(moved, 0), MOST_POLLS) if isinstance(moved, int) else 0
-            self.put_off(taken_ns, pauses=pauses, certain=bool(report.get("counted")))
+        if (progress.paused or progress.counted) and not progress.charged:
+            self.put_off(taken_ns, pauses=min(max(progress.moved, 0), MOST_POLLS), certain=progress.counted)
 
     def beside(self, taken_ns: int) -> None:
         """Add what a process did beside its steps, while the grader made it wait for matches or messages."""

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from contextlib import nullcontext
-from typing import Any
 
+from grader.runtime.host.protocol import AwaitMatches, Claim, Matched, is_name
 from grader.runtime.model.trace import GraphSnapshot
 from grader.runtime.patience import SETTLE_S, Patience, Wait
 from grader.runtime.stimuli.calls import PlannedCalls
-from grader.runtime.worker.claims import CHANNELS, answers, serves
+from grader.runtime.worker.claims import CHANNELS, ORDINARY_END, answers, serves
 from grader.runtime.worker.core import Core
 from grader.runtime.worker.matching import Match, Matching
 from grader.runtime.worker.observer import Observer
-from grader.runtime.worker.ros_names import is_name
 from grader.runtime.worker.service_peers import ServicePeers
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.trace_recorder import NAME_CHARACTERS, TraceRecorder
@@ -23,8 +22,6 @@ from grader.runtime.worker.trace_recorder import NAME_CHARACTERS, TraceRecorder
 DEPARTURE_S = 2.0
 #: Querying the graph is expensive: the pause keeps the queries from delaying discovery itself.
 GRAPH_PAUSE_S = 0.003
-#: The host never reports more unmatched names than this.
-MOST_UNMATCHED = 10_000
 
 #: Kind, name and type of an endpoint as the graph counts it. Servers and clients are counted by name alone.
 Key = tuple[str, str, str]
@@ -93,7 +90,7 @@ class Discovery:
         if self._observer.crowded:
             self._recorder.stop(now_ns, self._observer.crowded)
         self._recorder.note(*(f"the type of {name} is not known on this machine" for name in unknown))
-        writers = Counter((c["name"], c["type"]) for c in claims if c["kind"] == "publisher")
+        writers = Counter((c.name, c.type) for c in claims if c.kind == "publisher")
         self.patience.wait(lambda: all(self._watched(*writer) for writer in writers.items()))
         self.patience.wait(lambda: all(map(self.is_heard, self.matching.streams)))
         self.matching.announce_kept()
@@ -131,13 +128,13 @@ class Discovery:
         """Let a process wait, and note what it has missed."""
         student = question.process
         with nullcontext() if student.workload is None else student.workload.beside():
-            student.tell({"match": question.expected, "gone": question.gone, "wait_s": self.patience.wait_s})
+            student.tell(AwaitMatches(question.expected, question.gone, self.patience.wait_s))
             answer = student.report()
-        if answer is None or answer.get("kind") != "matched":
+        if not isinstance(answer, Matched):
             self._mark_dead(student)
             return
-        missing = [str(end).partition(" ") for end in _listed(answer.get("missing"))]
-        untold = [str(end).partition(" ") for end in _listed(answer.get("untold"))]
+        missing = [end.partition(" ") for end in answer.missing]
+        untold = [end.partition(" ") for end in answer.untold]
         self.matching.matched(student, [(kind, name) for kind, _, name in missing])
         if missing or untold:
             self.patience.lose()
@@ -151,27 +148,25 @@ class Discovery:
         if self.patience.is_left and any(s.unmatched and not s.ended for s in self._students):
             self.tell_all()
 
-    def _holds(self, now_ns: int, claims: list[dict[str, Any]]) -> bool:
+    def _holds(self, now_ns: int, claims: list[Claim]) -> bool:
         """Return whether the graph shows everything that the processes claim."""
         wanted = _wanted(claims)
         self._known |= wanted.keys()
-        names = {c["name"] for c in claims if c["kind"] == "node"}
+        names = {c.name for c in claims if c.kind == "node"}
         if not names <= {*self._observer.students_nodes(names)}:
             return False  # before anything that takes longer to query: this is asked most often
         self._query(now_ns)
         found = self._found
         offered = {(e.kind, e.service, e.type) for e in self._graph.services}
         # The end of an action outlives its node, and is then in the list of none.
-        nodes = [s.claims for s in self._staying() if any(c["kind"] == "node" for c in s.claims)]
-        exchanging = {
-            (c["kind"], c["name"], c["type"]) for own in nodes for c in own if c["kind"] in ("service", "client")
-        }
+        nodes = [s.claims for s in self._staying() if any(c.kind == "node" for c in s.claims)]
+        exchanging = {(c.kind, c.name, c.type) for own in nodes for c in own if c.kind in ("service", "client")}
         # The middleware tells the services of one node of a name. A node lives on until it is collected, and a process
         # that left may stay in the graph for its lease.
         namesakes = any(kind == "node" and count > 1 for (kind, _, _), count in found.items())
         return (namesakes or exchanging <= offered) and all(found[key] >= count for key, count in wanted.items())
 
-    def _surplus(self, claims: list[dict[str, Any]]) -> Counter[Key]:
+    def _surplus(self, claims: list[Claim]) -> Counter[Key]:
         """Count the removed endpoints that are still in the graph, except known strangers."""
         wanted = _wanted(claims)
         return +Counter({key: self._found[key] - wanted[key] - self._strangers[key] for key in self._known})
@@ -181,7 +176,7 @@ class Discovery:
 
         It includes services if any process has reported one.
         """
-        services = any(c["kind"] in ("service", "client") for s in self._students for c in s.claims)
+        services = any(c.kind in ("service", "client") for s in self._students for c in s.claims)
         services = services or bool(self._recorder.graph.services)
         nodes = self._nodes()
         self._graph = self._observer.graph(now_ns, services=services, existing=nodes)
@@ -193,13 +188,13 @@ class Discovery:
         self._found = found
 
     def _nodes(self) -> set[str]:
-        return {c["name"] for c in self.matching.claims() if c["kind"] == "node"}
+        return {c.name for c in self.matching.claims() if c.kind == "node"}
 
     def is_served(self, calls: PlannedCalls) -> bool:
         """Return whether the server for some calls exists and is matched."""
         service = self._services.resolved(calls.service)
         claims = [c for s in self._students if not s.ended for c in s.claims]
-        if service is None or not any(serves(c, service, calls.type) and answers(c, {}) for c in claims):
+        if service is None or not any(serves(c, service, calls.type) and answers(c, ORDINARY_END) for c in claims):
             return False
         self._services.add_clients(calls)
         if self.patience.wait(lambda: self._observer.services.is_matched(service)):
@@ -225,14 +220,10 @@ class Discovery:
         self._recorder.look(self._observer.with_qos(self._graph), self._observer.participants())
 
 
-def _listed(value: Any) -> list[Any]:
-    return value[:MOST_UNMATCHED] if isinstance(value, list) else []
+def _wanted(claims: list[Claim]) -> Counter[Key]:
+    return Counter(_key(c) for c in claims if c.kind != "parameter")
 
 
-def _wanted(claims: list[dict[str, Any]]) -> Counter[Key]:
-    return Counter(_key(c) for c in claims if c["kind"] != "parameter")
-
-
-def _key(claim: dict[str, Any]) -> Key:
-    exchanges = claim["kind"] in ("service", "client", "node")
-    return claim["kind"], claim["name"], "" if exchanges else claim["type"]
+def _key(claim: Claim) -> Key:
+    exchanges = claim.kind in ("service", "client", "node")
+    return claim.kind, claim.name, "" if exchanges else claim.type

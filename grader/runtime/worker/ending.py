@@ -1,13 +1,13 @@
-"""Turns the reports of a student's process into faults; reports are untrusted, so each field is checked."""
+"""Turns the reports of a student's process into faults; what it says is untrusted, also where it has the right type."""
 
 from __future__ import annotations
 
 import re
 import sys
 from collections.abc import Mapping
-from typing import Any
 
 from grader.runtime.host.faults import GRADERS, TEXT_CHARACTERS
+from grader.runtime.host.protocol import FRAMES, Exited, ReportedFault
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import duration, size
 from grader.runtime.model.trace import Fault, FaultKind, Mark
@@ -15,8 +15,6 @@ from grader.runtime.plan import Plan
 from grader.runtime.sandbox.start import OUTGROWN
 from grader.runtime.worker.notes import Places
 
-#: The most frames of an exception that are read from the report of a process.
-FRAMES = 20
 #: Processor seconds that a node may use until it first blocks, including its imports, and later between two blocks.
 START_CPU_S = 10.0
 #: Later there are no imports; a callback that takes longer hangs for everybody who waits for the node.
@@ -53,27 +51,25 @@ STOPPED_CODE = 130
 NORMAL_AT_STOP = ("ExternalShutdownException", "rcl_shutdown already called", "KeyboardInterrupt")
 
 
-def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: Places) -> Fault:
+def reported_fault(process: str, t_ns: int, told: ReportedFault, limits: Limits, places: Places) -> Fault:
     """Convert a reported fault; an error that a limit caused names the limit.
 
     Args:
         process: Name of the process.
         t_ns: Time of the fault.
-        data: The report: a code, a place, and for an exception its type and message.
+        told: What the process reports.
         limits: Limits of the process.
         places: The files of the submission; places outside of them are dropped.
     """
-    data = data if isinstance(data, dict) else {}
-    code = data.get("code")
-    hung = _HUNG.get(code) if isinstance(code, str) else None
-    kind = FaultKind.SYNTAX_ERROR if code == "syntax_error" else FaultKind.HUNG if hung else FaultKind.EXCEPTION
+    hung = _HUNG.get(told.code)
+    kind = FaultKind.SYNTAX_ERROR if told.code == "syntax_error" else FaultKind.HUNG if hung else FaultKind.EXCEPTION
     # Codes before words: what an exception says is up to the program.
-    text = hung or graders_fault(process, data) or _own_words(data)
+    text = hung or graders_fault(process, told) or _own_words(told)
     python = sys.version_info[:2] if kind is FaultKind.SYNTAX_ERROR else None
     if python is not None:
         text += f" (read by Python {python[0]}.{python[1]})"
     behind = next((words for error, words in _errors(limits).items() if error in text), "")
-    file, line = _place(data, places, kind)
+    file, line = _place(told, places, kind)
     return Fault(
         t_ns=t_ns,
         process=process,
@@ -81,56 +77,52 @@ def reported_fault(process: str, t_ns: int, data: Any, limits: Limits, places: P
         text=f"{text} (the limit is {behind})" if behind else text,
         file=file,
         line=line,
-        frames=_frames(data.get("frames"), places),
+        frames=_frames(told, places),
         python=python,
     )
 
 
-def graders_fault(process: str, data: Any) -> str:
+def graders_fault(process: str, told: ReportedFault | None) -> str:
     """Describe a reported fault of the grader's own code in a process, for a bug report; empty if it is another one."""
-    if not isinstance(data, dict) or data.get("code") != GRADERS:
+    if told is None or told.code != GRADERS:
         return ""
-    module, line, kind = data.get("module"), data.get("at"), data.get("type")
     # From the student's process: only what looks like a module and a line is shown.
-    known = isinstance(module, str) and _MODULE.fullmatch(module) and type(line) is int and 0 < line < 10_000
-    where = f", {module} line {line}" if known else ""
-    what = kind if isinstance(kind, str) and _TYPE.fullmatch(kind) else "Exception"
+    known = _MODULE.fullmatch(told.module) and 0 < told.at < 10_000
+    where = f", {told.module} line {told.at}" if known else ""
+    what = told.type if _TYPE.fullmatch(told.type) else "Exception"
     return f"the grader's own code failed in the process of {process}: {what}{where}; please report this line"
 
 
-def _own_words(data: Mapping[str, Any]) -> str:
+def _own_words(told: ReportedFault) -> str:
     """Format an exception as Python does: `Type: message`, on one line."""
-    name, message = data.get("type"), data.get("message")
-    name = name if isinstance(name, str) and _TYPE.fullmatch(name) else "Exception"
-    message = " ".join(message[:TEXT_CHARACTERS].split()) if isinstance(message, str) else ""
+    name = told.type if _TYPE.fullmatch(told.type) else "Exception"
+    message = " ".join(told.message[:TEXT_CHARACTERS].split())
     return (f"{name}: {message}" if message else name)[:TEXT_CHARACTERS]
 
 
-def _place(data: Mapping[str, Any], places: Places, kind: FaultKind) -> tuple[str, int]:
+def _place(told: ReportedFault, places: Places, kind: FaultKind) -> tuple[str, int]:
     """Return file and line of a fault if the submission has them; otherwise an empty string and 0."""
-    file, line = data.get("file"), data.get("line")
-    if not isinstance(file, str) or not places.has(file):
+    file, line = told.file, told.line
+    if not places.has(file):
         return "", 0
-    if kind is FaultKind.SYNTAX_ERROR and type(line) is int:
+    if kind is FaultKind.SYNTAX_ERROR:
         line = min(line, places.lines(file))  # Python reports an unexpected end one line after the last
-    return (file, line) if type(line) is int and places.has(file, line) else (file, 0)
+    return (file, line) if places.has(file, line) else (file, 0)
 
 
-def _frames(data: Any, places: Places) -> tuple[str, ...]:
-    frames = [f for f in data[:FRAMES] if isinstance(f, list) and len(f) == 3] if isinstance(data, list) else []
+def _frames(told: ReportedFault, places: Places) -> tuple[str, ...]:
     return tuple(
         f"{file}:{line} in {name}"
-        for file, line, name in frames
-        if places.has(file, line) and isinstance(name, str) and _FUNCTION.fullmatch(name)
+        for file, line, name in told.frames[:FRAMES]
+        if places.has(file, line) and _FUNCTION.fullmatch(name)
     )
 
 
-def ending_fault(process: str, t_ns: int, report: Mapping[str, Any], limits: Limits, places: Places) -> Fault:
+def ending_fault(process: str, t_ns: int, report: Exited, limits: Limits, places: Places) -> Fault:
     """Return the fault of a process that reported its end."""
-    if isinstance(report.get("fault"), dict):
-        return reported_fault(process, t_ns, report["fault"], limits, places)
-    code = report.get("code")
-    return exited(process, t_ns, code if type(code) is int else None)
+    if report.fault is not None:
+        return reported_fault(process, t_ns, report.fault, limits, places)
+    return exited(process, t_ns, report.code)
 
 
 def exited(process: str, t_ns: int, code: int | None) -> Fault:
@@ -145,7 +137,7 @@ def ended_by(process: str, t_ns: int, signal: str) -> Fault:
 
 
 def ending(  # noqa: PLR0913 - each comes from another place
-    process: str, t_ns: int, report: Mapping[str, Any], plan: Plan, places: Places, *, stopped: bool
+    process: str, t_ns: int, report: Exited, plan: Plan, places: Places, *, stopped: bool
 ) -> Fault | Mark:
     """Return the fault of a process that reported its end, or a mark if the end is normal.
 
@@ -165,20 +157,20 @@ def ending(  # noqa: PLR0913 - each comes from another place
     return ending_fault(process, t_ns, report, plan.limits, places)
 
 
-def is_free_exit(report: Mapping[str, Any]) -> bool:
+def is_free_exit(report: Exited) -> bool:
     """Return whether a process reports that it exited by itself with code 0."""
-    return not isinstance(report.get("fault"), dict) and report.get("code") == 0
+    return report.fault is None and report.code == 0
 
 
-def is_normal_stop(report: Mapping[str, Any]) -> bool:
+def is_normal_stop(report: Exited) -> bool:
     """Return whether a process ended after the stop signal as ROS programs do.
 
     rclpy shuts its contexts down at that signal, so a program that calls shutdown() itself gets an exception.
     """
-    fault = report.get("fault")
-    if isinstance(fault, dict):
-        return fault.get("code") == "exception" and any(normal in _own_words(fault) for normal in NORMAL_AT_STOP)
-    return report.get("code") in (0, STOPPED_CODE)
+    if report.fault is not None:
+        words = _own_words(report.fault)
+        return report.fault.code == "exception" and any(normal in words for normal in NORMAL_AT_STOP)
+    return report.code in (0, STOPPED_CODE)
 
 
 def never_stopped(process: str, t_ns: int, patience_ns: int) -> Fault:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
+from grader.runtime.host.protocol import Go, Launched, LaunchedNode, LeftOut
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import MOST_LAUNCHED, MOST_LEFT_OUT
 from grader.runtime.model.quantities import NS_PER_S
@@ -139,26 +139,26 @@ def _evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
     if report is None:
         kind = FaultKind.KILLED if student.stopped else FaultKind.HUNG if why else FaultKind.EXITED
         return EvaluatedLaunch(fault=Fault(0, student.name, kind, why or _ENDED))
-    if graders := graders_fault(student.name, report.get("fault")):
+    if graders := graders_fault(student.name, report.fault):
         return EvaluatedLaunch(harness_problem=graders)
     # The grader's own fault was looked for first: it is not the launch file's.
-    if "fault" in report:
-        return EvaluatedLaunch(fault=reported_fault(student.name, 0, report["fault"], plan.limits, student.places))
+    if report.fault is not None:
+        return EvaluatedLaunch(fault=reported_fault(student.name, 0, report.fault, plan.limits, student.places))
     return _launched(student.name, report, plan, student.places)
 
 
 _ENDED = "ended while it was evaluated, before it described anything"
 
 
-def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
+def _description(student: NodeProcess) -> tuple[Launched | None, str]:
     """Return the report, or None and why there is none."""
-    student.tell({})
+    student.tell(Go())
     started = time.monotonic()
     while True:
         for report in student.reports():
             if report is None:
                 return None, student.stopped
-            if report.get("kind") == "launched":
+            if isinstance(report, Launched):
                 return report, ""
         # What it writes is read, because a full pipe would block it.
         student.drain()
@@ -174,22 +174,22 @@ def _description(student: NodeProcess) -> tuple[dict[str, Any] | None, str]:
         time.sleep(LOOK_S)
 
 
-def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) -> EvaluatedLaunch:
+def _launched(name: str, report: Launched, plan: Plan, places: Places) -> EvaluatedLaunch:
     root, known = Path(plan.root), dict(plan.start_of(name).known)
     left_out: list[str] = []
     unstarted: list[tuple[str, str]] = []
     notes: list[str] = []
-    for one in _dicts(report.get("left_out"), MOST_LEFT_OUT):
+    for one in report.left_out[:MOST_LEFT_OUT]:
         words, text = _command(one), _left_out(name, one, places)
         if only := _only_name(words):
             unstarted.append((text, only))
         else:
             (notes if _is_harmless(words) else left_out).append(text)
     made = EvaluatedLaunch()
-    for node in _dicts(report.get("nodes"), MOST_LAUNCHED):
-        package, wanted = _text(node.get("package")), _text(node.get("executable"))
+    for node in report.nodes[:MOST_LAUNCHED]:
+        package, wanted = _text(node.package), _text(node.executable)
         # Reported by a process that the student's code shares: only a package that is there is named.
-        near = _text(node.get("near")) if has_package(plan.projects, _text(node.get("near"))) else ""
+        near = _text(node.near) if has_package(plan.projects, _text(node.near)) else ""
         known_package = has_package(plan.projects, package)
         look = find_executable(root, plan.projects, package, wanted) if known_package else find_loose(root, wanted)
         # A package that is misspelt is not there, even if a file of the same name lies elsewhere.
@@ -229,7 +229,7 @@ def _launched(name: str, report: Mapping[str, Any], plan: Plan, places: Places) 
 def _added(  # noqa: PLR0913  what one node consists of
     made: EvaluatedLaunch,
     launch: str,
-    node: Mapping[str, Any],
+    node: LaunchedNode,
     found: Executable,
     where: str,
     known: Mapping[str, str],
@@ -240,19 +240,17 @@ def _added(  # noqa: PLR0913  what one node consists of
     label = known.get(f"{found.file} {found.name}") or known.get(found.file) or launch
     number = sum(1 for _, other in made.labels if other == label)
     process = f"{label} ({number + 1})" if number or label == launch else label
-    files = [(_text(f[0]), _text(f[1], FILE_CHARACTERS)) for f in _lists(node.get("parameter_files"), 2)]
+    files = [(_text(path), _text(text, FILE_CHARACTERS)) for path, text in node.parameter_files[:ARGUMENTS]]
     start = PlannedStart(
         process,
         executable=found.name if found.target else "",
-        arguments=_texts(node.get("arguments")),
-        ros_arguments=_texts(node.get("ros_arguments")),
+        arguments=_texts(node.arguments),
+        ros_arguments=_texts(node.ros_arguments),
         parameter_files=tuple(files),
         launched_by=where,
     )
-    delay = node.get("delay_s")
     # Longer than any scenario is never; also NaN fails both comparisons.
-    late = isinstance(delay, (int, float)) and 0 < delay < 1e6
-    delay_ns = round(delay * NS_PER_S) if isinstance(delay, (int, float)) and late else 0
+    delay_ns = round(node.delay_s * NS_PER_S) if 0 < node.delay_s < 1e6 else 0
     return replace(
         made,
         processes=(*made.processes, (process, found.file)),
@@ -283,9 +281,9 @@ def _not_found(package: str, wanted: str, found: Executable | None, known: Seque
     return f"{text}; its executables are {names}" if names else f"{text}; it has no executables"
 
 
-def _command(one: Mapping[str, Any]) -> list[str]:
+def _command(one: LeftOut) -> list[str]:
     """Return the words of a command that was left out; none for anything else, and where a shell may run more."""
-    text = _text(one.get("text")) if one.get("code") == "command" else ""
+    text = _text(one.text) if one.code == "command" else ""
     # A shell may run anything behind these characters, so that such a command counts as unknown.
     return [] if re.search(r"[;&|`$<>\n]", text) else text.split()
 
@@ -304,33 +302,24 @@ def _only_name(words: Sequence[str]) -> str:
     return next((name if name.startswith("/") else f"/{name}" for name in named), "")
 
 
-def _left_out(name: str, one: Mapping[str, Any], places: Places) -> str:
+def _left_out(name: str, one: LeftOut, places: Places) -> str:
     return f"{_place(name, one, places)}: {left_out_sentence(one)}"
 
 
-def _place(name: str, one: Mapping[str, Any], places: Places) -> str:
-    file, line = one.get("file"), one.get("line")
-    if isinstance(file, str) and places.has(file, line):
+def _place(name: str, one: LeftOut | LaunchedNode, places: Places) -> str:
+    file, line = one.file, one.line
+    if places.has(file, line):
         return f"{file}:{line}"
-    own = file == name and type(line) is int and 0 < line < 100_000  # the rubric's own launch file
+    own = file == name and 0 < line < 100_000  # the rubric's own launch file
     return f"{name}:{line}" if own else name
 
 
-def _dicts(value: Any, most: int) -> Iterator[Mapping[str, Any]]:
-    yield from (one for one in (value[:most] if isinstance(value, list) else ()) if isinstance(one, dict))
+def _text(text: str, most: int = CHARACTERS) -> str:
+    return text[:most].replace("\0", "")
 
 
-def _lists(value: Any, length: int) -> Iterator[Sequence[Any]]:
-    lists = value[:ARGUMENTS] if isinstance(value, list) else ()
-    yield from (one for one in lists if isinstance(one, list) and len(one) == length)
-
-
-def _text(value: Any, most: int = CHARACTERS) -> str:
-    return value[:most].replace("\0", "") if isinstance(value, str) else ""
-
-
-def _texts(value: Any) -> tuple[str, ...]:
-    return tuple(_text(one) for one in value[:ARGUMENTS]) if isinstance(value, list) else ()
+def _texts(texts: Sequence[str]) -> tuple[str, ...]:
+    return tuple(map(_text, texts[:ARGUMENTS]))
 
 
 def expanded(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Plan:

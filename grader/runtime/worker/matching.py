@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, Generic, Protocol
+from typing import Generic, Protocol
 
+from grader.runtime.host.protocol import NO_COUNTERPARTS, ORDINARY, Claim, Counterparts
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.stimuli.messages import PlannedMessages
-from grader.runtime.worker.claims import CHANNELS, ORDINARY, answers, compatible, fits, passes, readers_of, serves
+from grader.runtime.worker.claims import CHANNELS, ORDINARY_END, answers, compatible, fits, passes, readers_of, serves
 from grader.runtime.worker.core import Core, P, announce
 
 
@@ -28,12 +29,12 @@ class Match(Generic[P]):
 
     Attributes:
         process: The process.
-        expected: Kind of endpoint -> name -> numbers of counterparts; see `await_matches` of the host's ledger.
+        expected: The counterparts.
         gone: The services whose servers have left, and are to disappear.
     """
 
     process: P
-    expected: Mapping[str, Mapping[str, list[int]]]
+    expected: Counterparts
     gone: list[str]
 
 
@@ -69,7 +70,7 @@ class Matching(Generic[P]):
         self._writers: Counter[str] = Counter()
         self._refused: dict[tuple[str, int], set[tuple[str, int]]] = {}
 
-    def claims(self) -> list[dict[str, Any]]:
+    def claims(self) -> list[Claim]:
         """Return the endpoints of all processes that have not ended."""
         return [c for process in self._core.processes if not process.ended for c in process.claims]
 
@@ -77,18 +78,16 @@ class Matching(Generic[P]):
         """Note that a stimulus has a new publisher."""
         self._writers[topic] += 1
 
-    def offered(self, topic: str) -> dict[str, Any]:
+    def offered(self, topic: str) -> Claim:
         """Describe the publisher of a stimulus as a process would describe its own."""
         fixed = self.fixed.get(topic)
-        return {
-            **ORDINARY,
-            "name": topic,
-            "type": self.streams[topic],
-            "reliable": fixed is None or not fixed.best_effort,
-            "latched": topic in self.latched if fixed is None else fixed.latched,
-        }
+        qos = ORDINARY._replace(
+            reliable=fixed is None or not fixed.best_effort,
+            latched=topic in self.latched if fixed is None else fixed.latched,
+        )
+        return Claim("publisher", topic, self.streams[topic], qos=qos)
 
-    def takes(self, reader: dict[str, Any], topic: str) -> bool:
+    def takes(self, reader: Claim, topic: str) -> bool:
         """Return whether a subscription is compatible with the stimulus on a topic."""
         return topic in self.streams and compatible(self.offered(topic), reader)
 
@@ -96,21 +95,21 @@ class Matching(Generic[P]):
         """Return how many subscriptions the publisher of a stimulus is to be matched with."""
         writer = self.offered(topic)
         # The grader watches its own stimuli where a student publishes on the same topic.
-        own = sum(writer["reliable"] or not reliable for reliable in self._watching(topic, writer["type"]))
+        own = sum(writer.qos.reliable or not reliable for reliable in self._watching(topic, writer.type))
         return int(own + sum(compatible(writer, c) for c in readers_of(self.claims(), topic)))
 
     def announce_kept(self) -> None:
         """Announce the messages that latched publishers resend to new transient-local subscriptions."""
         writers = [("", self.offered(topic), self.published[topic]) for topic in self.fixed]
         for talker in self._core.processes:
-            latched = [c for c in talker.claims if c["kind"] == "publisher" and c["latched"]]
+            latched = [c for c in talker.claims if c.kind == "publisher" and c.qos.latched]
             # how many a student's publisher keeps is not known, but that one comes is certain
-            writers += [(talker.name, c, min(1, self._core.kept[talker.name, c["name"]])) for c in latched]
+            writers += [(talker.name, c, min(1, self._core.kept[talker.name, c.name])) for c in latched]
         served = {
-            (student.name, writer["name"], sender): count
+            (student.name, writer.name, sender): count
             for sender, writer, count in writers
             for student in self._core.processes
-            if any(c["latched"] and compatible(writer, c) for c in readers_of(student.claims, writer["name"]))
+            if any(c.qos.latched and compatible(writer, c) for c in readers_of(student.claims, writer.name))
         }
         students = {student.name: student for student in self._core.processes}
         for (reader, topic, sender), count in served.items():
@@ -128,10 +127,11 @@ class Matching(Generic[P]):
         claims = self.claims()
         self._count_refused()
         for process in self._core.processes:
-            if not process.ended and (process.claims or process.told):
+            if not process.ended and (process.claims or process.told != NO_COUNTERPARTS):
                 expected = self._expected(process, claims, graph)
-                gone = sorted(process.told.get("client", {}).keys() - expected.get("client", {}).keys())
-                if expected == process.told and not ((process.renewed or process.unmatched) and expected):
+                gone = sorted(process.told.client.keys() - expected.client.keys())
+                again = (process.renewed or process.unmatched) and expected != NO_COUNTERPARTS
+                if expected == process.told and not again:
                     continue
                 process.told, process.renewed = expected, False
                 yield Match(process, expected, gone)
@@ -143,59 +143,57 @@ class Matching(Generic[P]):
 
     def _count_refused(self) -> None:
         """Note for each publisher and subscription of a process the counterparts whose QoS keeps them apart."""
-        writers: dict[tuple[str, str], list[tuple[tuple[str, int], dict[str, Any]]]] = {}
+        writers: dict[tuple[str, str], list[tuple[tuple[str, int], Claim]]] = {}
         for topic, interface in self.streams.items():
             writers.setdefault((topic, interface), []).append(((topic, self._writers[topic]), self.offered(topic)))
         ends = [
-            ((student.name, claim.get("number", 0)), claim)
+            ((student.name, claim.number), claim)
             for student in self._core.processes
             for claim in student.claims
-            if claim["kind"] in ("publisher", "subscription")
+            if claim.kind in ("publisher", "subscription")
         ]
         for end, claim in ends:
-            if claim["kind"] == "publisher":
-                writers.setdefault((claim["name"], claim["type"]), []).append((end, claim))
+            if claim.kind == "publisher":
+                writers.setdefault((claim.name, claim.type), []).append((end, claim))
         for reader, wish in ends:
-            same = writers.get((wish["name"], wish["type"]), []) if wish["kind"] == "subscription" else []
+            same = writers.get((wish.name, wish.type), []) if wish.kind == "subscription" else []
             for writer, offer in same:
-                if not fits(offer, wish):
+                if not fits(offer.qos, wish.qos):
                     self._refused.setdefault(reader, set()).add(writer)
                     self._refused.setdefault(writer, set()).add(reader)
 
-    def _expected(
-        self, process: P, claims: list[dict[str, Any]], graph: Mapping[str, int]
-    ) -> dict[str, dict[str, list[int]]]:
-        expected: dict[str, dict[str, list[int]]] = {}
+    def _expected(self, process: P, claims: list[Claim], graph: Mapping[str, int]) -> Counterparts:
+        ends: dict[str, dict[str, list[int]]] = {
+            kind: {} for kind in ("publisher", "subscription", "client", "service")
+        }
+        heard, refused = {}, {}
         for claim in process.claims:
             count = self._counterparts(claim, claims)
             if count:
-                expected.setdefault(claim["kind"], {}).setdefault(claim["name"], []).append(count)
-            elif claim["kind"] == "client" and (heard := self._hearing(claim, claims)):
-                expected.setdefault("heard", {})[claim["name"]] = [heard]
-            number = claim.get("number", 0)
-            if refused := self._refused.get((process.name, number)):
-                expected.setdefault("refused", {})[str(number)] = [len(refused)]
-        if process.sees_graph:
-            expected["graph"] = {name: [count] for name, count in graph.items()}
-        return expected
+                ends[claim.kind].setdefault(claim.name, []).append(count)
+            elif claim.kind == "client" and (hearing := self._hearing(claim, claims)):
+                heard[claim.name] = hearing
+            if kept_apart := self._refused.get((process.name, claim.number)):
+                refused[str(claim.number)] = len(kept_apart)
+        return Counterparts(**ends, heard=heard, refused=refused, graph=dict(graph) if process.sees_graph else None)
 
-    def _counterparts(self, claim: dict[str, Any], claims: list[dict[str, Any]]) -> int:
-        kind, name = claim["kind"], claim["name"]
+    def _counterparts(self, claim: Claim, claims: list[Claim]) -> int:
+        kind, name = claim.kind, claim.name
         if kind == "publisher":
-            students = sum(compatible(claim, c) for c in claims if c["kind"] == "subscription")
-            watching = self._watching(name, claim["type"])
-            return students + sum(fits(claim, {"reliable": reliable}) for reliable in watching)
+            students = sum(compatible(claim, c) for c in claims if c.kind == "subscription")
+            watching = self._watching(name, claim.type)
+            return students + sum(fits(claim.qos, ORDINARY._replace(reliable=reliable)) for reliable in watching)
         if kind == "subscription":
-            return self.takes(claim, name) + sum(compatible(c, claim) for c in claims if c["kind"] == "publisher")
+            return self.takes(claim, name) + sum(compatible(c, claim) for c in claims if c.kind == "publisher")
         if kind == "service":
-            asking = ("client", name, claim["type"])
-            students = sum((c["kind"], c["name"], c["type"]) == asking for c in claims)
+            asking = ("client", name, claim.type)
+            students = sum((c.kind, c.name, c.type) == asking for c in claims)
             return students + self._services.ends_of("client", name)
         if kind != "client":
             return 0
-        graders = self._services.serves(name, claim["type"]) and answers({}, claim)
-        return int(graders or any(serves(c, name, claim["type"]) and answers(c, claim) for c in claims))
+        graders = self._services.serves(name, claim.type) and answers(ORDINARY_END, claim)
+        return int(graders or any(serves(c, name, claim.type) and answers(c, claim) for c in claims))
 
-    def _hearing(self, client: dict[str, Any], claims: list[dict[str, Any]]) -> int:
+    def _hearing(self, client: Claim, claims: list[Claim]) -> int:
         """Count the servers that get the requests of a client, although it may not get their responses."""
-        return sum(serves(c, client["name"], client["type"]) and passes(client, c) for c in claims)
+        return sum(serves(c, client.name, client.type) and passes(client, c) for c in claims)

@@ -7,8 +7,8 @@ import re
 import stat
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
-from typing import Any
 
+from grader.runtime.host.protocol import LeftOut, Note
 from grader.runtime.model.limits import MAX_FILE_BYTES, MOST_LAUNCHED
 from grader.runtime.model.trace import Start, StartWay, main_not_called
 
@@ -103,37 +103,34 @@ def quoted(text: str) -> str:
     return f'"{plain[: _QUOTED_CHARACTERS - 1]}…"' if len(plain) > _QUOTED_CHARACTERS else f'"{plain}"'
 
 
-def left_out_words(data: Mapping[str, Any]) -> str:
+def left_out_words(told: LeftOut) -> str:
     """Return the words for something of a launch file that is not evaluated.
 
     Args:
-        data: The report, with `code`, `name` and `text`.
+        told: What a process reports of it.
     """
-    words, known = _LEFT_OUT.get(str(data.get("code")), ("something", None))
-    name, text = (value if isinstance(value, str) else "" for value in (data.get("name"), data.get("text")))
-    if known is not None and not known.fullmatch(name):
-        name = quoted(name)
-    return words.format(name=name, text=quoted(text))
+    words, known = _LEFT_OUT.get(told.code, ("something", None))
+    name = told.name if known is None or known.fullmatch(told.name) else quoted(told.name)
+    return words.format(name=name, text=quoted(told.text))
 
 
-def left_out_sentence(data: Mapping[str, Any]) -> str:
+def left_out_sentence(told: LeftOut) -> str:
     """Return what `left_out_words` says as a sentence, with the reason."""
-    code, count = str(data.get("code")), data.get("count")
-    why, words = _WHY.get(code), left_out_words(data)
-    if code == "nodes" and type(count) is int and 1 < count < MOST_COUNTED:
-        return f"{count} nodes beyond the first {MOST_LAUNCHED} were left out: {why}"
-    told = f"{words} was left out: {why}" if why else f"{words} is not supported and was left out"
-    return f"{told}; the launch file was evaluated no further" if data.get("ends") is True else told
+    why, words = _WHY.get(told.code), left_out_words(told)
+    if told.code == "nodes" and 1 < told.times < MOST_COUNTED:
+        return f"{told.times} nodes beyond the first {MOST_LAUNCHED} were left out: {why}"
+    sentence = f"{words} was left out: {why}" if why else f"{words} is not supported and was left out"
+    return f"{sentence}; the launch file was evaluated no further" if told.ends else sentence
 
 
 _WAYS = {way.value: way for way in StartWay}
-#: The longest name of a function in a note, and the most files that hide modules in one report.
-_NAME_CHARACTERS, _HIDDEN = 100, 20
+#: The longest name of a function in a note.
+_NAME_CHARACTERS = 100
 #: The dotted name of a module. Folder names may contain spaces, parentheses and hyphens.
 _TARGET = re.compile(r"[\w.() -]{1,300}")
 
 
-def note_of(file: str, data: Mapping[str, Any], places: Places) -> str:
+def note_of(file: str, data: Note, places: Places) -> str:
     """Return the note for a code; empty if the code is unknown or names something impossible.
 
     Args:
@@ -141,11 +138,11 @@ def note_of(file: str, data: Mapping[str, Any], places: Places) -> str:
         data: The report.
         places: The files of the submission.
     """
-    say = NOTES.get(str(data.get("code")))
+    say = NOTES.get(data.code)
     return say(file, data, places) if say is not None else ""
 
 
-def start_of(process: str, file: str, data: Mapping[str, Any], places: Places) -> Start | None:
+def start_of(process: str, file: str, data: Note, places: Places) -> Start | None:
     """Return how a process reports that its file is started; None if the report is not valid.
 
     Args:
@@ -154,16 +151,15 @@ def start_of(process: str, file: str, data: Mapping[str, Any], places: Places) -
         data: The report.
         places: The files of the submission.
     """
-    way, module, function = _WAYS.get(str(data.get("way"))), data.get("module"), data.get("function")
-    if way is None or not isinstance(module, str) or not isinstance(function, str):
+    way, module, function = _WAYS.get(data.way), data.module, data.function
+    if way is None or module is None or function is None:
         return None
     stem = file.rpartition("/")[2].rpartition(".")[0]
     named = all(map(_is_name, function.split("."))) if function else True
     if way is not StartWay.SCRIPT and (not named or module.rpartition(".")[2] != stem or not _TARGET.fullmatch(module)):
         return None
     target = "" if way is StartWay.SCRIPT else f"{module}:{function}" if function else module
-    hidden = data.get("hidden")
-    kept = [n for n in hidden[:_HIDDEN] if _is_there(n, file, places)] if isinstance(hidden, list) else []
+    kept = [name for name in data.hidden if _is_there(name, file, places)]
     return Start(process, file, way, target, tuple(kept))
 
 
@@ -173,9 +169,9 @@ def hidden_notes(start: Start) -> list[str]:
     return [f"{name} {need}" for name in start.hidden]
 
 
-def _is_there(name: object, file: str, places: Places) -> bool:
+def _is_there(name: str, file: str, places: Places) -> bool:
     """Return whether a module is in the folder of a file or in a parent folder."""
-    if not isinstance(name, str) or "/" in name:
+    if "/" in name:
         return False
     folders = [file]
     while folders[-1]:
@@ -184,37 +180,32 @@ def _is_there(name: object, file: str, places: Places) -> bool:
     return any(places.has(path) or places.has(f"{path}/__init__.py") for path in paths)
 
 
-def _main_not_called(file: str, data: Mapping[str, Any], places: Places) -> str:
+def _main_not_called(file: str, data: Note, places: Places) -> str:
     del data, places
     return main_not_called(file)
 
 
-def _class_not_started(file: str, data: Mapping[str, Any], places: Places) -> str:
+def _class_not_started(file: str, data: Note, places: Places) -> str:
     del places
-    name = data.get("class")
+    name = data.class_name
     if not _is_name(name):
         return ""
     problem = f"{file}: nothing starts {name}, so `python3 {file}` would do nothing"
     return f"{problem}; add a main() that calls rclpy.init(), makes the node and spins it"
 
 
-def _neighbour_imported(file: str, data: Mapping[str, Any], places: Places) -> str:
-    name = data.get("module")
+def _neighbour_imported(file: str, data: Note, places: Places) -> str:
+    name = data.module
     if not _is_name(name) or not places.has(f"{file.rpartition('/')[0]}/{name}.py".lstrip("/")):
         return ""
     problem = f"{file}: import {name} finds {name}.py beside it with `python3` only, not with `ros2 run`"
     return f"{problem}; in a package, write: from . import {name}"
 
 
-def _other_domain(file: str, data: Mapping[str, Any], places: Places) -> str:
+def _other_domain(file: str, data: Note, places: Places) -> str:
     del places
-    node, domain = data.get("node"), data.get("domain")
-    if (
-        not isinstance(node, str)
-        or not _NODE.fullmatch(node)
-        or type(domain) is not int
-        or not 0 <= domain <= MOST_DOMAIN
-    ):
+    node, domain = data.node, data.domain
+    if not _NODE.fullmatch(node) or domain is None or not 0 <= domain <= MOST_DOMAIN:
         return ""
     problem = f"{file}: the node {node} is in the ROS domain {domain}, where the grader does not see it"
     return f"{problem}; remove what sets domain_id or ROS_DOMAIN_ID"
@@ -225,7 +216,7 @@ def _is_name(name: object) -> bool:
 
 
 #: Every code that a process may send, with the function that words its note.
-NOTES: Mapping[str, Callable[[str, Mapping[str, Any], Places], str]] = {
+NOTES: Mapping[str, Callable[[str, Note, Places], str]] = {
     "main_not_called": _main_not_called,
     "class_not_started": _class_not_started,
     "neighbour_imported": _neighbour_imported,

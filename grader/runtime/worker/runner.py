@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from grader.runtime.host.protocol import Claim, ThreadFault
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Mark, Observation, Offer, Trace
 from grader.runtime.plan import Plan
@@ -186,19 +187,18 @@ class Runner(ABC):
         if self._recorder.full:
             self._agenda.end_by(now_ns)
 
-    def _note_offers(self, student: NodeProcess, claims: Iterable[Mapping[str, Any]], now_ns: int) -> None:
+    def _note_offers(self, student: NodeProcess, claims: Iterable[Claim], now_ns: int) -> None:
         """Record the services, clients and parameters of a process that are new."""
         for claim in claims:
-            offer = (claim["kind"], claim["name"][:300], claim["type"][:300])
+            offer = (claim.kind, claim.name[:300], claim.type[:300])
             told = offer in student.offers or len(student.offers) >= OFFERS
-            if claim["kind"] in ("service", "client", "parameter") and not told:
+            if claim.kind in ("service", "client", "parameter") and not told:
                 student.offers.add(offer)
                 self._recorder.add(Offer(now_ns, student.name, *offer))
 
-    def _report_fault(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
+    def _report_fault(self, student: NodeProcess, report: ThreadFault, now_ns: int) -> None:
         """Record a fault that a process has reported."""
-        fault, limits = report.get("fault"), self._plan.limits
-        self._recorder.add(reported_fault(student.name, now_ns, fault, limits, student.places))
+        self._recorder.add(reported_fault(student.name, now_ns, report.fault, self._plan.limits, student.places))
 
     def _arrival(self, event: Event) -> Event | None:
         """Return an event as it reaches the processes; None for a message that is lost on the way."""

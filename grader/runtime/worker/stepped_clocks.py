@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Mapping, Sequence
 
+from grader.runtime.host.protocol import Go
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
 from grader.runtime.model.trace import ClockKind, Endpoint, Observation, unmet_policy
 from grader.runtime.plan import Plan, derive
@@ -119,7 +120,7 @@ class WallSteppedRunner(SteppedRunner, WallRunner):
 
     def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
         if not delay_ns:
-            student.tell({"now_ns": 0, "free_until_ns": 0})
+            student.tell(Go())
 
     def _await_start(self, started: Sequence[NodeProcess]) -> None:
         others = len(self._observer.students_nodes())

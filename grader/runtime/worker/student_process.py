@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import contextlib
 import itertools
-import json
 import os
 import re
 import select
@@ -13,11 +12,25 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Sequence
 from dataclasses import field, replace
-from typing import Any
 
-from grader.runtime.host.written import ALL_BYTES, FILE_BYTES, FILES
+from grader.runtime.host.protocol import (
+    MOST_WRITTEN,
+    Answer,
+    Exited,
+    Launched,
+    Note,
+    Reached,
+    Ready,
+    Report,
+    ThreadFault,
+    Written,
+    WrittenContent,
+    line_of,
+    report_of,
+)
+from grader.runtime.host.written import ALL_BYTES, FILE_BYTES
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import size
@@ -38,7 +51,6 @@ LOG_FORMAT = "\x1e{token}\x1f{severity}\x1f{name}\x1f{file_name}\x1f{line_number
 _RECORD = re.compile(
     "\x1e([0-9a-f]{32})\x1f([A-Z]+)\x1f([^\x1e\x1f]*)\x1f([^\x1e\x1f]*)\x1f([0-9]+)\x1f([^\x1d\x1e]*)\x1d\n?"
 )
-_TOKEN = re.compile("[0-9a-f]{32}")
 #: The host never sends a longer report.
 REPORT_BYTES = 4 << 20
 #: The host never sends more reports at once; and the most reads from its socket and from each stream in a row.
@@ -190,20 +202,20 @@ class NodeProcess(Process):
         """Return what the process writes to, until it has ended; may be called from another thread."""
         return () if self.ended else tuple(self._sources)
 
-    def tell(self, answer: Mapping[str, Any]) -> None:
+    def tell(self, answer: Answer) -> None:
         """Send an answer. A dead process is noticed at its next report."""
         try:
-            self.line.sendall(json.dumps(answer).encode() + b"\n")
+            self.line.sendall(line_of(answer))
         except OSError:
             return
 
     def is_ready(self) -> bool:
         """Wait for the first report, sent before any of the student's code runs; return whether it is valid."""
-        report = self.report() or {}
-        token = str(report.get("log_token"))
-        # Checked, although the host sends it: nothing that comes on this socket is believed unchecked.
-        self.log_token = token if _TOKEN.fullmatch(token) else ""
-        return report.get("kind") == "ready"
+        report = self.report()
+        if not isinstance(report, Ready):
+            return False
+        self.log_token = report.log_token
+        return True
 
     def measured(self, t_ns: int) -> Workload:
         """Return the workload of the process; the first call marks the start of its program."""
@@ -211,31 +223,31 @@ class NodeProcess(Process):
             self.workload = Workload(self.process.pid, t_ns)
         return self.workload
 
-    def note(self, report: Mapping[str, Any]) -> None:
+    def note(self, report: Note) -> None:
         """Record a note: how the file is started, which comes first, or something that readers must know."""
         # The first counts: a program that writes to this socket itself could only add another one.
-        if report.get("code") == "started":
+        if report.code == "started":
             if self.start_told is None and (start := start_of(self.name, self.file, report, self.places)):
                 self.start_told = replace(start, arguments=self.arguments, launched_by=self.launched_by)
                 self.notes += hidden_notes(start)
         elif len(self.notes) < NOTES and (text := note_of(self.file, report, self.places)):
             self.notes.append(text[:NOTE_CHARACTERS])
 
-    def report(self) -> dict[str, Any] | None:
+    def report(self) -> Report | None:
         """Wait for the next report, as `_next_report` does, and record what no runner has to know on the way."""
         report = self._next_report()
         while report is not None and self._is_aside(report):
             report = self._next_report()
         return report
 
-    def _is_aside(self, report: Mapping[str, Any]) -> bool:
+    def _is_aside(self, report: Report) -> bool:
         """Record a report of an audit event or of written files; return whether it was one."""
-        if report.get("kind") == "reached" and len(self.reached) < REACHED:
-            self.reached.append(str(report.get("what"))[:NAME_CHARACTERS])
+        if isinstance(report, Reached) and len(self.reached) < REACHED:
+            self.reached.append(report.what[:NAME_CHARACTERS])
             return True
         # Once, at its end; more of them come from the program.
-        if report.get("kind") == "written" and not self.written:
-            self.written = written_files(self.name, report.get("files"))
+        if isinstance(report, Written) and not self.written:
+            self.written = written_files(self.name, report.files)
             return True
         return False
 
@@ -251,10 +263,12 @@ class NodeProcess(Process):
                     return
             while b"\n" in self._pending:
                 report = self._parsed_report()
-                if report is not None and not self._is_aside(report) and report.get("kind") == "exited":
+                if isinstance(report, Exited):
                     return
+                if report is not None:
+                    self._is_aside(report)
 
-    def _next_report(self) -> dict[str, Any] | None:
+    def _next_report(self) -> Report | None:
         """Wait for the next report and read output meanwhile; None if the process has ended or timed out."""
         if b"\n" in self._pending:
             self.drain()
@@ -271,18 +285,14 @@ class NodeProcess(Process):
                 return None
         return self._parsed_report()
 
-    def _parsed_report(self) -> dict[str, Any] | None:
+    def _parsed_report(self) -> Report | None:
         line, _, self._pending = self._pending.partition(b"\n")
-        try:
-            data = json.loads(line.decode())
-        except (ValueError, RecursionError):
-            return None
-        if not isinstance(data, dict):
-            return None
-        self.grader_failed = self.grader_failed or graders_fault(self.name, data.get("fault"))
-        return data
+        report = report_of(line)
+        if isinstance(report, (Exited, ThreadFault, Launched)):
+            self.grader_failed = self.grader_failed or graders_fault(self.name, report.fault)
+        return report
 
-    def reports(self) -> list[dict[str, Any] | None]:
+    def reports(self) -> list[Report | None]:
         """Return the reports that have arrived, without waiting; the last one is None if the process has ended."""
         gone = False
         for _ in range(READS_AT_ONCE):
@@ -291,12 +301,12 @@ class NodeProcess(Process):
             gone = not self._receive() or len(self._pending) > REPORT_BYTES
         if self._pending.count(b"\n") > REPORTS_AT_ONCE:
             return [None]
-        found: list[dict[str, Any] | None] = []
+        found: list[Report | None] = []
         while b"\n" in self._pending:
             report = self._parsed_report()
             if report is None or not self._is_aside(report):
                 found.append(report)
-        return [*found, None] if gone and not any(r and r.get("kind") == "exited" for r in found) else found
+        return [*found, None] if gone and not any(isinstance(report, Exited) for report in found) else found
 
     def _receive(self) -> bool:
         try:
@@ -461,12 +471,11 @@ class NodeProcess(Process):
             self.process.close()
 
 
-def written_files(process: str, data: Any) -> tuple[WrittenFile, ...]:
+def written_files(process: str, files: Sequence[WrittenContent]) -> tuple[WrittenFile, ...]:
     """Return the files that a process reports to have written, without those that are too large or oddly named."""
     found: list[WrittenFile] = []
-    for file in data[:FILES] if isinstance(data, list) else ():
-        name, content = (file.get("name"), file.get("content")) if isinstance(file, dict) else (None, None)
-        if not isinstance(name, str) or not isinstance(content, str) or len(content) > FILE_BYTES * 4 // 3 + 4:
+    for name, content in files:
+        if len(content) > FILE_BYTES * 4 // 3 + 4:
             continue
         parts = name.split("/")
         odd = len(name) > WRITTEN_NAME_CHARACTERS or not name.isprintable() or {"", ".", ".."} & {*parts}
@@ -474,7 +483,7 @@ def written_files(process: str, data: Any) -> tuple[WrittenFile, ...]:
             if not odd and base64.b64encode(base64.b64decode(content, validate=True)).decode() == content:
                 found.append(WrittenFile(process, name, content))
     sizes = itertools.accumulate(len(file.content) for file in found)
-    return tuple(file for file, size in zip(found, sizes, strict=True) if size <= ALL_BYTES * 4 // 3 + 4 * FILES)
+    return tuple(file for file, size in zip(found, sizes, strict=True) if size <= ALL_BYTES * 4 // 3 + 4 * MOST_WRITTEN)
 
 
 def _signal_name(number: int) -> str:

@@ -155,7 +155,7 @@ class VirtualTopicPeers(TopicPeers):
                 announce(student, f"topic {topic}", 1)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
-        return [(reader["type"], reader["latched"]) for s in self._students for reader in readers_of(s.claims, topic)]
+        return [(reader.type, reader.qos.latched) for s in self._students for reader in readers_of(s.claims, topic)]
 
     def _withdraw(self, topic: str, now_ns: int) -> None:
         del now_ns

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import Any
 
 from grader.runtime.host.originals import wait_until
+from grader.runtime.host.protocol import MOST_CLAIMS, Arrived, Exited, Expect, Go, Idle, Note, Progress, ThreadFault
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Mark, Observation
 from grader.runtime.patience import Wait
 from grader.runtime.plan import Plan
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.server import AddServer, RemoveServer
-from grader.runtime.worker.claims import ORDINARY_END, counts, is_claim, passes
+from grader.runtime.worker.claims import ORDINARY_END, passes
 from grader.runtime.worker.core import Arriving, Command, Core, Limit, Play, Receive, Retry, RunProcess, Taken, senders
 from grader.runtime.worker.discovery import Discovery
 from grader.runtime.worker.ending import ending
@@ -25,8 +25,8 @@ from grader.runtime.worker.topic_peers import VirtualTopicPeers
 from grader.runtime.worker.trace_recorder import NAME_CHARACTERS
 from grader.runtime.worker.workload import Workload
 
-#: The host never sends more reports before it waits or ends, and never reports more endpoints and parameters.
-MOST_REPORTS, CLAIMS = 10_000, 1_000
+#: The host never sends more reports before it waits or ends.
+MOST_REPORTS = 10_000
 #: Reasons for recording on the wall clock.
 THREADS = "the node's threads wait for each other without blocking"
 OUTSIDE = "the node waits for something that is neither ROS nor time"
@@ -115,10 +115,10 @@ class VirtualRunner(Runner):
         if run.starts:
             self._recorder.add(Mark(now_ns, "process_starts", student.name))
         free_ns = epoch_ns + run.free_until_ns
-        answer = {"now_ns": epoch_ns + now_ns, "free_until_ns": free_ns, "arrivals": run.arrivals}
         workload = student.measured(now_ns)
         workload.begin(now_ns, arrivals=bool(run.arrivals))
-        student.tell({**answer, "interrupt": True} if student.stop_signalled and not student.stopping else answer)
+        interrupt = student.stop_signalled and not student.stopping
+        student.tell(Go(epoch_ns + now_ns, free_ns, run.arrivals, interrupt))
         student.stopping = student.stop_signalled
         self._hear(student, workload)
         self._remove_done()
@@ -135,66 +135,66 @@ class VirtualRunner(Runner):
         began_ns = self._core.now_ns
         for _ in range(MOST_REPORTS):
             report = student.report()
-            kind = None if report is None else report.get("kind")
-            # What the host never sends comes from the program, which then speaks for it.
-            if report is None or kind not in ("arrived", "note", "fault", "idle", "exited"):
+            if isinstance(report, Arrived):
+                workload.arrived()
+            elif isinstance(report, Note):
+                student.note(report)
+            elif isinstance(report, ThreadFault):
+                self._write_output(student, final=False)
+                self._report_fault(student, report, self._core.now_ns)
+            elif isinstance(report, (Idle, Exited)):
+                self._rest(student, report, workload, began_ns)
+                return
+            else:
+                # What the host never sends comes from the program, which then speaks for it.
                 self._mark_dead(student)
                 return
-            if kind == "arrived":
-                workload.arrived()
-                continue
-            # Before anything is recorded: the process may have let time pass on its own.
-            if isinstance(now_ns := report.get("now_ns"), int):
-                self._core.reached(now_ns - self._plan.epoch_ns)
-            if kind == "note":
-                student.note(report)
-                continue
-            self._write_output(student, final=kind == "exited")
-            if kind == "fault":
-                self._report_fault(student, report, self._core.now_ns)
-                continue
-            # Before the messages are collected: waiting for them is the grader's time, not the program's.
-            workload.end(report, self._core.now_ns - began_ns)
-            student.leaving = report.get("leaving") is True
-            self._account(student, report)
-            if kind == "exited":
-                student.unsettled = str(report.get("unsettled", ""))
-                student.exit_code = code if type(code := report.get("code")) is int else None
-                stopped, places = student.stop_signalled, student.places
-                self._end(student, ending(student.name, self._core.now_ns, report, self._plan, places, stopped=stopped))
-                if report.get("left"):
-                    self._discovery.await_departure(self._core.now_ns)
-                return
-            if student.leaving:
-                self._carry_out(self._core.hand_over())
-            wake_ns = report.get("wake_ns")
-            self._core.waits(student, wake_ns - self._plan.epoch_ns if isinstance(wake_ns, int) else None)
-            return
         self._mark_dead(student)
 
-    def _account(self, student: NodeProcess, report: Mapping[str, Any]) -> None:
+    def _rest(self, student: NodeProcess, report: Idle | Exited, workload: Workload, began_ns: int) -> None:
+        """Handle the last report of a process at this instant."""
+        now_ns, is_over = report.progress.now_ns, isinstance(report, Exited)
+        # Before anything is recorded: the process may have let time pass on its own.
+        if now_ns is not None:
+            self._core.reached(now_ns - self._plan.epoch_ns)
+        self._write_output(student, final=is_over)
+        # Before the messages are collected: waiting for them is the grader's time, not the program's.
+        workload.end(report.progress, self._core.now_ns - began_ns)
+        student.leaving = isinstance(report, Idle) and report.leaving
+        self._account(student, report.progress, is_over=is_over)
+        if isinstance(report, Exited):
+            student.unsettled, student.exit_code = report.unsettled, report.code
+            stopped, places = student.stop_signalled, student.places
+            self._end(student, ending(student.name, self._core.now_ns, report, self._plan, places, stopped=stopped))
+            if report.left:
+                self._discovery.await_departure(self._core.now_ns)
+            return
+        if student.leaving:
+            self._carry_out(self._core.hand_over())
+        self._core.waits(student, None if report.wake_ns is None else report.wake_ns - self._plan.epoch_ns)
+
+    def _account(self, student: NodeProcess, progress: Progress, *, is_over: bool) -> None:
         """Take what a process has published, announce it to the receivers, and match new endpoints."""
-        for channel, count in counts(report.get("lost")).items():
+        for channel, count in progress.lost.items():
             where = channel[:NAME_CHARACTERS]
             some = "a message" if count == 1 else f"{count:,} messages"
             self._recorder.note(f"{student.name}: {some} on {where} did not arrive in time")
             self._has_lost = True
-        if sent := counts(report.get("sent")):
-            early = _of_topics(counts(report.get("early")))
+        if sent := progress.sent:
+            early = _of_topics(progress.early)
             # In this order: recorded, then announced. A process that answers an announcement must not be recorded
             # before what it answers.
             self._collect(_of_topics(sent), {t: n for t, n in early.items() if self._core.is_new(student, t)})
             self._collect_exchanges(student, sent)
             self._core.sent(student, sent)
-        endpoints = report.get("endpoints")
-        if isinstance(endpoints, list) and report["kind"] == "idle":
-            if len(endpoints) > CLAIMS:
-                why = f"more than {CLAIMS:,} endpoints and parameters of {student.name}"
+        if progress.endpoints is not None and not is_over:
+            if len(progress.endpoints) > MOST_CLAIMS:
+                why = f"more than {MOST_CLAIMS:,} endpoints and parameters of {student.name}"
                 self._recorder.stop(self._core.now_ns, why)
                 # Nothing is recorded after this, and waiting until all of them are seen takes half a minute.
                 return
-            self._core.has(student, [c for c in endpoints if is_claim(c)])
-            student.sees_graph = report.get("sees_graph") is True
+            self._core.has(student, [claim for claim in progress.endpoints if claim is not None])
+            student.sees_graph = progress.sees_graph
             self._note_offers(student, student.claims, self._core.now_ns)
             self._discovery.match(self._core.now_ns)
             # A new endpoint may be the server that a call has waited for.
@@ -258,9 +258,9 @@ class VirtualRunner(Runner):
         """Make a process wait for the messages on their way to it, because their sender is about to leave."""
         student = receive.process
         with nullcontext() if student.workload is None else student.workload.beside():
-            student.tell({"expect": receive.arrivals})
+            student.tell(Expect(receive.arrivals))
             answer = student.report()
-        if answer is None or answer.get("kind") != "arrived":
+        if not isinstance(answer, Arrived):
             self._mark_dead(student)
 
     def _write_output(self, student: NodeProcess, *, final: bool) -> None:

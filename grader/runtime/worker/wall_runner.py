@@ -8,10 +8,11 @@ the run is not judged.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
+from grader.runtime.host.protocol import Claim, EarlyMessage, Exited, Go, Note, Parameters, Stop, ThreadFault
 from grader.runtime.model.quantities import NS_PER_MS
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Mark, Message, Observation, Offer
@@ -20,7 +21,6 @@ from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.events import Disappear
 from grader.runtime.stimuli.messages import Advertise
 from grader.runtime.stimuli.server import RemoveServer
-from grader.runtime.worker.claims import is_claim
 from grader.runtime.worker.ending import ending
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.runner import Runner
@@ -120,7 +120,7 @@ class WallRunner(Runner):
         self._started = self._real_time.monotonic_ns()
         for student in self._students:
             if student.name not in self._agenda.starts_ns:
-                student.tell({"now_ns": 0, "free_until_ns": 0})
+                student.tell(Go())
 
     def _run_on(self) -> None:
         """Poll until the end, or until nothing more can happen."""
@@ -156,7 +156,7 @@ class WallRunner(Runner):
         return self._agenda.end_ns
 
     def _interrupt(self, student: NodeProcess) -> None:
-        student.tell({"stop": True})
+        student.tell(Stop())
 
     def _harness_problem(self) -> str:
         """Report that the machine was too busy, unless the nodes themselves delayed the loop."""
@@ -180,7 +180,7 @@ class WallRunner(Runner):
             if 0 < self._agenda.starts_ns.get(student.name, 0) <= now_ns:
                 del self._agenda.starts_ns[student.name]
                 self._recorder.add(Mark(now_ns, "process_starts", student.name))
-                student.tell({"now_ns": 0, "free_until_ns": 0})
+                student.tell(Go())
             self._hear(student, now_ns)
         for taken in self._observer.take(MESSAGES_A_LOOK):
             self._record(now_ns, taken, arrived_ns=self._arrived(taken.arrived_ns, now_ns))
@@ -221,26 +221,25 @@ class WallRunner(Runner):
             if report is None:
                 self._recorder.add(*student.output(now_ns, final=True), student.death(now_ns))
                 student.ended = True
-            elif report.get("kind") == "note":
+            elif isinstance(report, Note):
                 student.note(report)
-            elif report.get("kind") == "early":
+            elif isinstance(report, EarlyMessage):
                 self._note_early(report)
-            elif report.get("kind") == "parameters":
+            elif isinstance(report, Parameters):
                 self._note_parameters(student, report, now_ns)
-            elif report.get("kind") == "fault":
+            elif isinstance(report, ThreadFault):
                 self._report_fault(student, report, now_ns)
-            elif report.get("kind") == "exited":
+            elif isinstance(report, Exited):
                 self._recorder.add(*student.output(now_ns, final=True))
                 stopped, places = student.stop_signalled, student.places
-                student.exit_code = code if type(code := report.get("code")) is int else None
+                student.exit_code = report.code
                 self._recorder.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
         self._recorder.add(*student.output(now_ns))
 
-    def _note_parameters(self, student: NodeProcess, report: Mapping[str, Any], now_ns: int) -> None:
-        claims = report.get("claims")
-        valid = [claim for claim in claims if is_claim(claim)] if isinstance(claims, list) else []
-        self._note_offers(student, (claim for claim in valid if claim["kind"] == "parameter"), now_ns)
+    def _note_parameters(self, student: NodeProcess, report: Parameters, now_ns: int) -> None:
+        claims = [claim for claim in report.claims if claim is not None and claim.kind == "parameter"]
+        self._note_offers(student, claims, now_ns)
 
     def _note_services(self, now_ns: int) -> None:
         """Record the services and clients in the graph; one of several processes is known by its parameters alone."""
@@ -248,18 +247,17 @@ class WallRunner(Runner):
         only = self._students[0] if len(self._students) == 1 else None
         for end in self._recorder.graph.services:
             student = only or nodes.get(end.node)
-            claim = {"kind": end.kind, "name": end.service, "type": end.type}
+            claim = Claim(end.kind, end.service, end.type)
             if student is not None:
                 self._note_offers(student, [claim], now_ns)
             elif (offer := (end.kind, end.service, end.type)) not in self._nobodys:
                 self._nobodys.add(offer)
                 self._recorder.add(Offer(now_ns, "", *offer))
 
-    def _note_early(self, report: Mapping[str, Any]) -> None:
-        topic, began_ns, ended_ns = (report.get(name) for name in ("topic", "began_ns", "ended_ns"))
-        if self._early_told < MOST_EARLY and isinstance(began_ns, int) and isinstance(ended_ns, int):
+    def _note_early(self, report: EarlyMessage) -> None:
+        if self._early_told < MOST_EARLY:
             self._early_told += 1
-            self._early.setdefault(str(topic), []).append((began_ns, ended_ns))
+            self._early.setdefault(report.topic, []).append((report.began_ns, report.ended_ns))
 
     def _look_at_graph(self, now_ns: int) -> bool:
         """Record the graph, subscribe to what is new, and return whether it has changed."""

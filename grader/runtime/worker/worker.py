@@ -22,6 +22,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from grader.runtime.host import machine
+from grader.runtime.host.protocol import Stop
 from grader.runtime.host.starter import CONNECTED
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import Limits
@@ -513,7 +514,7 @@ def _await_ready(student: NodeProcess) -> None:
 
 def _last_words(student: NodeProcess) -> str:
     student.drain()
-    words = [getattr(line, "text", "") for line in student.output(0, final=True)]
+    words = [one.text for one in student.output(0, final=True)]
     return " | ".join(words[-3:])[:500] or "no output"
 
 
@@ -521,7 +522,7 @@ def end_in_order(students: list[NodeProcess]) -> None:
     """Send the stop signal to every running process, and take what it reports at its end."""
     running = [student for student in students if not student.ended]
     for student in running:
-        student.tell({"stop": True})
+        student.tell(Stop())
     for student in running:
         student.last_report(LAST_REPORT_S * load_per_processor())
 
@@ -552,7 +553,7 @@ def stop(students: list[NodeProcess]) -> None:
     """Send the stop signal to every running process, wait briefly, then kill it."""
     for student in students:
         if not student.ended:
-            student.tell({"stop": True})
+            student.tell(Stop())
     for student in students:
         student.kill()
         student.close()

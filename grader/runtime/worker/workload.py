@@ -10,11 +10,11 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from grader.runtime import usage
+from grader.runtime.host.protocol import Progress
 from grader.runtime.model.quantities import NS_PER_MS
 from grader.runtime.usage import Kernel
 from grader.runtime.worker.delay import ARRIVAL_NS, BESIDE_FREE_NS, Delay
@@ -72,15 +72,15 @@ class Workload:
             self._forgiven_ns = min(time.monotonic_ns() - self._began_ns, ARRIVAL_NS)
             self._began_ns += self._forgiven_ns
 
-    def end(self, report: Mapping[str, Any], passed_ns: int = 0) -> None:
+    def end(self, progress: Progress, passed_ns: int = 0) -> None:
         """Note that the process has reported that it waits or has ended.
 
         Args:
-            report: `threads`: whether another thread than the first ran; for the rest see `Delay.step`.
+            progress: What it reports of the step.
             passed_ns: The virtual time that has passed in the step.
         """
-        taken_ns = self._taken(threads=bool(report.get("threads")))
-        self.delay.step(taken_ns, report, passed_ns, forgiven_ns=self._forgiven_ns, moved_on=self._moved_on)
+        taken_ns = self._taken(threads=progress.threads)
+        self.delay.step(taken_ns, progress, passed_ns, forgiven_ns=self._forgiven_ns, moved_on=self._moved_on)
 
     @contextmanager
     def beside(self) -> Iterator[None]:

@@ -21,7 +21,9 @@ import time_machine  # noqa: E402, F401 - it takes long: once for all repetition
 
 sys.path.remove(str(HOST))
 program = launcher.load_package()
-entry, virtual, times = (sys.modules[f"_grader_host.{name}"] for name in ("entry", "virtual", "times"))
+entry, virtual, times, protocol = (
+    sys.modules[f"_grader_host.{name}"] for name in ("entry", "virtual", "times", "protocol")
+)
 sys.modules["_grader_host.unseen"].IMPORTS.end()
 EPOCH_NS = sys.modules["_grader_host.clock"].EPOCH_NS
 UPTIME_NS = sys.modules["_grader_host.clock"].UPTIME_NS
@@ -71,23 +73,23 @@ class Stage:
         """Return what ended a thread."""
         return f"fault {type(error).__name__}: {error}"
 
-    def ask(self, report: dict[str, Any]) -> dict[str, Any]:
+    def ask(self, report: Any) -> Any:
         """Answer as the grader does."""
         self._questions += 1
-        if report["wake_ns"] is None:
+        if report.wake_ns is None:
             self.end("idle for ever")
         if self._questions > QUESTIONS:
             self.end("asks without end")
-        return {"now_ns": report["wake_ns"], "free_until_ns": report["wake_ns"]}
+        return protocol.Go(report.wake_ns, report.wake_ns)
 
-    def send(self, report: dict[str, Any]) -> None:
+    def send(self, report: Any) -> None:
         """Note what is reported."""
         self.say(report)
 
-    def note(self, said: dict[str, Any]) -> None:
+    def note(self, said: Any) -> None:
         """Note what the host has to mention, as `code: value, value`."""
-        values = ", ".join(str(value) for name, value in said.items() if name != "code" and value)
-        self.say(f"{said['code']}: {values}" if values else said["code"])
+        values = ", ".join(str(value) for value in said[1:] if value)
+        self.say(f"{said.code}: {values}" if values else said.code)
 
     def end(self, why: str) -> None:
         """Hand over what was said, and end the process."""

@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
-import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from places import ROOT
 
-FAULTS = ROOT / "grader/runtime/host/faults.py"
-
-
-@pytest.fixture(scope="module")
-def faults() -> types.ModuleType:
-    spec = importlib.util.spec_from_file_location("faults_under_test", FAULTS)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from grader.runtime.host import faults
 
 
 @pytest.fixture
-def text_of(faults: types.ModuleType, tmp_path: Path) -> Callable[..., Any]:
+def text_of(tmp_path: Path) -> Callable[..., Any]:
     """Return what is said of an exception in a submission that lies in a temporary folder."""
 
     def one_line(error: Any) -> str:
         told = faults.Describer(str(tmp_path)).exception(error)
-        return f"{told['type']}: {told['message']}" if told["message"] else told["type"]
+        return f"{told.type}: {told.message}" if told.message else told.type
 
     return one_line
 
@@ -102,12 +89,10 @@ def test_an_endless_text_is_cut(text_of: Callable[..., Any]) -> None:
 
 
 @pytest.mark.parametrize("message", ["", "no", "ValueError: no", "ValueError"])
-def test_the_name_of_the_class_is_no_part_of_the_message(
-    faults: types.ModuleType, tmp_path: Path, message: str
-) -> None:
+def test_the_name_of_the_class_is_no_part_of_the_message(tmp_path: Path, message: str) -> None:
     """They are sent as two values."""
     told = faults.Describer(str(tmp_path)).exception(ValueError(message))
-    assert (told["code"], told["type"], told["message"]) == ("exception", "ValueError", message)
+    assert (told.code, told.type, told.message) == ("exception", "ValueError", message)
 
 
 def test_a_str_that_raises_leaves_the_class(text_of: Callable[..., Any]) -> None:
@@ -120,17 +105,17 @@ def test_a_str_that_raises_leaves_the_class(text_of: Callable[..., Any]) -> None
     assert text_of(BrokenError()).startswith("test_faults.")
 
 
-def test_only_a_file_that_cannot_be_compiled_has_a_syntax_error(faults: types.ModuleType, tmp_path: Path) -> None:
+def test_only_a_file_that_cannot_be_compiled_has_a_syntax_error(tmp_path: Path) -> None:
     """Anybody may raise one by hand: that is an exception of the line that raises it."""
     good, bad = tmp_path / "good.py", tmp_path / "bad.py"
     good.write_text("x = 1\n")
     bad.write_text("x = (\n")
     told = faults.Describer(str(tmp_path)).exception
-    assert told(SyntaxError("x", (str(bad), 1, 5, "x = (")))["code"] == "syntax_error"
+    assert told(SyntaxError("x", (str(bad), 1, 5, "x = ("))).code == "syntax_error"
     stranges: list[Any] = [str(good), 7, "\0", str(tmp_path / "none.py")]
     for strange in stranges:
         found = told(SyntaxError("never closed", (strange, 3, 1, "x")))
-        assert (found["code"], found["type"], found["message"]) == ("exception", "SyntaxError", "never closed")
+        assert (found.code, found.type, found.message) == ("exception", "SyntaxError", "never closed")
 
 
 #: A program, and the exception of its chain that is told: the type and the line.
@@ -171,13 +156,11 @@ CHAINS = {
 
 
 @pytest.mark.parametrize(("program", "kind", "line"), CHAINS.values(), ids=list(CHAINS))
-def test_the_first_exception_of_a_chain_is_told(
-    faults: types.ModuleType, tmp_path: Path, program: str, kind: str, line: int
-) -> None:
+def test_the_first_exception_of_a_chain_is_told(tmp_path: Path, program: str, kind: str, line: int) -> None:
     """But not one that the program was ready for."""
     file = tmp_path / "node.py"
     file.write_text(program)
     with pytest.raises((Exception, KeyboardInterrupt)) as caught:
         exec(compile(program, str(file), "exec"), {})
     told = faults.Describer(str(tmp_path)).exception(caught.value)
-    assert (told["type"], told["file"], told["line"]) == (kind, "node.py", line)
+    assert (told.type, told.file, told.line) == (kind, "node.py", line)

@@ -6,7 +6,7 @@ import json
 import re
 import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from inspect import Parameter
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ import pytest
 from grader.runtime.host import launch_names
 from grader.runtime.host.faults import Describer
 from grader.runtime.host.launch_files import describe, meant_by
+from grader.runtime.host.protocol import LaunchedNode, LeftOut
 from grader.runtime.worker.notes import left_out_sentence, left_out_words
 
 IMPORTS = """
@@ -42,7 +43,7 @@ from launch_ros.events.lifecycle import ChangeState
 from launch_ros.utilities import make_namespace_absolute
 TALKER = dict(package="robot", executable="talker")
 """
-Described = tuple[list[dict[str, Any]], list[dict[str, Any]]]
+Described = tuple[list[LaunchedNode], list[LeftOut]]
 
 
 @pytest.fixture
@@ -67,8 +68,8 @@ def described(tmp_path: Path) -> Callable[..., Described]:
     return evaluate
 
 
-def ros(nodes: list[dict[str, Any]]) -> list[list[str]]:
-    return [node["ros_arguments"] for node in nodes]
+def ros(nodes: list[LaunchedNode]) -> list[Sequence[str]]:
+    return [node.ros_arguments for node in nodes]
 
 
 def test_a_node_has_everything_it_is_started_with(described: Callable[..., Described]) -> None:
@@ -80,10 +81,10 @@ def test_a_node_has_everything_it_is_started_with(described: Callable[..., Descr
     assert left_out == []
     (node,) = nodes
     rules = ["-r", "__node:=a", "-r", "__ns:=/b", "-r", "x:=/y"]
-    assert node["ros_arguments"] == [*rules, "--log-level", "debug"]
-    assert (node["package"], node["executable"], node["arguments"]) == ("robot", "talker", ["go"])
-    assert (node["file"], node["delay_s"]) == ("robot/launch/a.launch.py", 0.0)
-    assert node["line"] == IMPORTS.count("\n") + 3
+    assert node.ros_arguments == [*rules, "--log-level", "debug"]
+    assert (node.package, node.executable, node.arguments) == ("robot", "talker", ["go"])
+    assert (node.file, node.delay_s) == ("robot/launch/a.launch.py", 0.0)
+    assert node.line == IMPORTS.count("\n") + 3
 
 
 PARAMETERS = {
@@ -102,7 +103,7 @@ PARAMETERS = {
 def test_parameters_keep_their_types(described: Callable[..., Described], given: str, expected: str) -> None:
     """A text stays a text, and the text of a substitution is read as YAML, as launch_ros does."""
     nodes, _ = described(f"DeclareLaunchArgument('n', default_value='5'), Node(**TALKER, parameters=[{given}])")
-    assert nodes[0]["parameter_files"] == [[expected, f'"/**": {{ros__parameters: {expected}}}\n']]
+    assert nodes[0].parameter_files == [[expected, f'"/**": {{ros__parameters: {expected}}}\n']]
 
 
 def test_parameter_files_and_values_keep_their_order(described: Callable[..., Described]) -> None:
@@ -112,11 +113,11 @@ def test_parameter_files_and_values_keep_their_order(described: Callable[..., De
         f"Node(**TALKER, name='a', namespace='/n', parameters=[{share} + '/own.yaml', {{'rate': 3.0}}]), "
         "Node(**TALKER, parameters=[ParameterFile(PathJoinSubstitution([FindPackageShare('robot'), 'no.yaml']))])"
     )
-    assert nodes[0]["parameter_files"] == [
+    assert nodes[0].parameter_files == [
         ["own.yaml", "/**: {ros__parameters: {rate: 2.0}}\n"],
         ['{"rate": 3.0}', '"/n/a": {ros__parameters: {"rate": 3.0}}\n'],
     ]
-    assert nodes[1]["parameter_files"] == []
+    assert nodes[1].parameter_files == []
     assert [left_out_words(one) for one in left_out] == ["the parameter file no.yaml"]
 
 
@@ -168,8 +169,8 @@ def test_included_files_get_arguments(described: Callable[..., Described]) -> No
         part=part,
     )
     assert [rules[1] for rules in ros(nodes)] == ["__node:=one", "__node:=one_more", "a:=b"]
-    assert [node["delay_s"] for node in nodes] == [0.0, 2.0, 0.0]
-    assert nodes[2]["arguments"] == ["hi"]
+    assert [node.delay_s for node in nodes] == [0.0, 2.0, 0.0]
+    assert nodes[2].arguments == ["hi"]
 
 
 LEFT_OUT = {
@@ -197,9 +198,9 @@ LEFT_OUT = {
 def test_what_only_ros_can_do_is_named(described: Callable[..., Described], action: str, what: str) -> None:
     """With its line; everything else of the file is described all the same."""
     nodes, left_out = described(f"{action}, Node(**TALKER, name='after')")
-    assert "__node:=after" in nodes[-1]["ros_arguments"]
+    assert "__node:=after" in nodes[-1].ros_arguments
     line = IMPORTS.count("\n") + 3
-    ((place, words),) = [((one["file"], one["line"]), left_out_words(one)) for one in left_out]
+    ((place, words),) = [((one.file, one.line), left_out_words(one)) for one in left_out]
     assert (place, words) == (("robot/launch/a.launch.py", line), what)
 
 
@@ -252,7 +253,7 @@ def test_what_launch_files_import_is_there(
     (tmp_path / "robot" / "robot" / "words.py").write_text("NAME = 'own'\n")
     with patch.object(sys, "path", [*sys.path]):
         nodes, left_out = described(actions, before=f"{imported or 'pass'}\n")
-    assert ([node["executable"] for node in nodes], left_out) == (["talker"], [])
+    assert ([node.executable for node in nodes], left_out) == (["talker"], [])
 
 
 @pytest.mark.parametrize("package", ["xacro", "nav2_common.launch", "moveit_configs_utils"])
@@ -265,9 +266,9 @@ def test_what_a_package_that_is_not_here_makes_is_left_out_where_it_is_used(
         "Node(**TALKER, parameters=[{'a': 1}]), absent.Thing(a=1)",
         before=f"import {package} as absent\nmade = absent.process_file('a.xacro', mappings={{'a': 'b'}})\n",
     )
-    assert [node["executable"] for node in nodes] == ["talker"]
+    assert [node.executable for node in nodes] == ["talker"]
     (one,) = left_out
-    assert (left_out_words(one), one["count"]) == (f"what needs the package {package.partition('.')[0]}", 2)
+    assert (left_out_words(one), one.times) == (f"what needs the package {package.partition('.')[0]}", 2)
 
 
 @pytest.mark.parametrize(
@@ -277,7 +278,7 @@ def test_what_a_package_that_is_not_here_makes_is_left_out_where_it_is_used(
 def test_a_misspelt_package_is_told(described: Callable[..., Described], package: str, near: str) -> None:
     """A name with a part or a number more may be that of another package."""
     nodes, _ = described(f"Node(package='{package}', executable='talker')")
-    assert [node["near"] for node in nodes] == [near]
+    assert [node.near for node in nodes] == [near]
 
 
 @pytest.mark.parametrize(
@@ -311,9 +312,9 @@ def test_what_a_launch_file_cannot_go_on_without_is_named(
     with patch.dict("os.environ", PATH="/nowhere"), patch("subprocess._USE_VFORK", new=False, create=True):
         nodes, left_out = described("Node(**TALKER)", before=f"{imported}{line}\n")
     assert nodes == []
-    ((file, words),) = [(one["file"], left_out_words(one)) for one in left_out]
+    ((file, words),) = [(one.file, left_out_words(one)) for one in left_out]
     assert (file, words) == ("robot/launch/a.launch.py", what)
-    assert left_out[0]["line"] >= IMPORTS.count("\n") + 5
+    assert left_out[0].line >= IMPORTS.count("\n") + 5
 
 
 #: What neither ROS nor the grader has: imports, actions and the exception.
@@ -349,14 +350,14 @@ def test_what_ros_does_not_have_is_the_mistake_of_the_launch_file(
     with pytest.raises(Exception, match=r"\S") as raised:
         described(action, before=f"{imported}\n")
     assert type(raised.value).__name__ == error
-    assert Describer(str(tmp_path)).exception(raised.value)["code"] == "exception"
+    assert Describer(str(tmp_path)).exception(raised.value).code == "exception"
 
 
 def test_a_name_of_a_release_whose_names_are_not_known_is_left_out(described: Callable[..., Described]) -> None:
     """It may exist there."""
     with patch.dict("os.environ", ROS_DISTRO="kilted"):
         nodes, left_out = described("launch.actions.Newer(), Node(**TALKER)", before="import launch.newer\n")
-    assert [node["executable"] for node in nodes] == ["talker"]
+    assert [node.executable for node in nodes] == ["talker"]
     assert [left_out_words(one) for one in left_out] == ["the action Newer"]
 
 
@@ -431,7 +432,7 @@ def test_parameters_are_for_the_node_that_launch_ros_means(
 ) -> None:
     """Without a namespace in the launch file, the class of the node may set one."""
     nodes, _ = described(f"Node(**TALKER, parameters=[{{'x': 1}}], {arguments})")
-    assert nodes[0]["parameter_files"][0][1].startswith(json.dumps(target))
+    assert nodes[0].parameter_files[0][1].startswith(json.dumps(target))
     assert [one for one in ros(nodes)[0] if "__ns" in one] == ([] if namespace is None else [f"__ns:={namespace}"])
 
 
@@ -466,8 +467,8 @@ def test_a_share_folder_is_as_installed_and_writable(
         b="def generate_launch_description():\n    return LaunchDescription([Node(**TALKER)])\n",
     )
     assert left_out == []
-    assert nodes[0]["arguments"] == ["<robot/>"]
-    assert (nodes[1]["file"], nodes[1]["line"]) == ("robot/launch/b.launch.py", IMPORTS.count("\n") + 3)
+    assert nodes[0].arguments == ["<robot/>"]
+    assert (nodes[1].file, nodes[1].line) == ("robot/launch/b.launch.py", IMPORTS.count("\n") + 3)
     assert (tmp_path / "robot" / "maps" / "a.yaml").read_text() == "old"
 
 
@@ -595,7 +596,7 @@ def test_a_mistake_of_a_launch_file_is_its_own(
     """Whichever line of the evaluator raises, no mistake is taken for one of the grader's code."""
     with pytest.raises(BaseException) as raised:  # noqa: PT011  whatever ros2 launch would raise
         described(mistake)
-    assert Describer(str(tmp_path)).exception(raised.value)["code"] == "exception"
+    assert Describer(str(tmp_path)).exception(raised.value).code == "exception"
 
 
 @pytest.mark.parametrize("argument", ["parameters", "name", "remappings", "arguments"])
@@ -627,12 +628,12 @@ def test_a_node_with_an_argument_that_is_left_out_is_left_out(
 )
 def test_what_is_left_out_has_its_reason(told: dict[str, Any], said: str) -> None:
     """As a sentence for notes."""
-    assert left_out_sentence(told).startswith(said)
+    assert left_out_sentence(LeftOut.checked(told)).startswith(said)
 
 
 def test_what_ends_the_evaluation_says_so(described: Callable[..., Described]) -> None:
     """Nothing that follows is started, which is no news where a single action is left out."""
     nodes, left_out = described("ExecuteProcess(cmd=['rm', 'x']), Node(**TALKER)")
-    assert (len(nodes), ["ends" in one for one in left_out]) == (1, [False])
+    assert (len(nodes), [one.ends for one in left_out]) == (1, [False])
     nodes, left_out = described("Node(**TALKER, name=get_package_share_directory('turtlesim')), Node(**TALKER)")
-    assert (nodes, [one.get("ends") for one in left_out]) == ([], [True])
+    assert (nodes, [one.ends for one in left_out]) == ([], [True])

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from places import ROOT
 
+from grader.runtime.host.protocol import Counterparts
+
 pytest.importorskip("rclpy", reason="needs rclpy")
 from std_srvs.srv import Trigger
 
@@ -159,5 +161,5 @@ def test_a_server_sees_no_client_that_has_left(
     ledger.add("service", server)
     last = seen[-1]
     monkeypatch.setattr(ledger, "_clients_of", lambda _: seen.pop(0) if seen else last)
-    assert ledger.await_matches(expected, 600) == []
+    assert ledger.await_matches(Counterparts(**expected), 600) == []
     assert seen == []

@@ -14,7 +14,8 @@ from hostile import hostile, printed, record
 from mcap.reader import make_reader
 from tiers import more
 
-from grader.runtime.host.written import ALL_BYTES, FILE_BYTES, FILES
+from grader.runtime.host.protocol import MOST_WRITTEN, Written
+from grader.runtime.host.written import ALL_BYTES, FILE_BYTES
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB
 from grader.runtime.model.trace import ClockKind, Trace, WrittenFile
@@ -117,11 +118,11 @@ def test_only_plain_small_files_are_kept(run: Run) -> None:
         os.mkfifo(here / "pipe")
         (here / "large").write_bytes(bytes({FILE_BYTES} + 1))
         (here / "small").write_bytes(b"1")
-        for number in range(3 * {FILES}):
+        for number in range(3 * {MOST_WRITTEN}):
             (here / f"z{{number:02}}").write_bytes(b"2")
         """
     names = [name for _, name in kept(run(hostile(before=odd)))]
-    assert names == ["small", *(f"z{number:02}" for number in range(FILES - 1))]
+    assert names == ["small", *(f"z{number:02}" for number in range(MOST_WRITTEN - 1))]
 
 
 @pytest.mark.ros
@@ -169,15 +170,18 @@ def test_files_are_attachments_of_the_recording() -> None:
     assert found["written/a.py/log.txt"] == b"hello"
 
 
+def believed(files: object) -> tuple[WrittenFile, ...]:
+    """Return the files that a process has written, by what it reports."""
+    return written_files("a.py", Written.checked({"files": files}).files)
+
+
 @pytest.mark.parametrize(
     "name", ["../x", "/etc/x", "a//b", "a/./b", "", ".", "x\x1b[2J", "x\n", "x" * 201, 7, None, "\udc80", ["x"]]
 )
 def test_a_reported_file_with_an_odd_name_is_dropped(name: object) -> None:
     """What a process reports is untrusted."""
     good = {"name": "good.csv", "content": "MQ=="}
-    assert written_files("a.py", [{"name": name, "content": "MQ=="}, good]) == (
-        WrittenFile("a.py", "good.csv", "MQ=="),
-    )
+    assert believed([{"name": name, "content": "MQ=="}, good]) == (WrittenFile("a.py", "good.csv", "MQ=="),)
 
 
 @pytest.mark.parametrize(
@@ -185,17 +189,17 @@ def test_a_reported_file_with_an_odd_name_is_dropped(name: object) -> None:
 )
 def test_a_report_that_is_none_is_dropped(data: object) -> None:
     """What a process reports is untrusted."""
-    assert written_files("a.py", data) == ()
+    assert believed(data) == ()
 
 
 def test_reported_files_are_limited() -> None:
     """In number, in the size of each, and in all."""
     whole = base64.b64encode(bytes(FILE_BYTES)).decode()
     more = base64.b64encode(bytes(FILE_BYTES + 3)).decode()
-    assert written_files("a.py", [{"name": "x", "content": more}]) == ()
-    found = written_files("a.py", [{"name": f"{n}", "content": whole} for n in range(3 * FILES)])
+    assert believed([{"name": "x", "content": more}]) == ()
+    found = believed([{"name": f"{n}", "content": whole} for n in range(3 * MOST_WRITTEN)])
     assert len(found) == ALL_BYTES // FILE_BYTES
-    assert len(written_files("a.py", [{"name": f"{n}", "content": ""} for n in range(3 * FILES)])) == FILES
+    assert len(believed([{"name": f"{n}", "content": ""} for n in range(3 * MOST_WRITTEN)])) == MOST_WRITTEN
 
 
 def test_a_submission_that_is_too_large_is_not_copied(tmp_path: Path) -> None:

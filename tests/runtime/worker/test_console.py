@@ -2,6 +2,7 @@
 
 import pytest
 
+from grader.runtime.host.protocol import ReportedFault
 from grader.runtime.model.trace import LogRecord, OutputLine
 from grader.runtime.worker.console import Logged, last_traceback, read_console, thread_tracebacks
 
@@ -66,14 +67,8 @@ TRACEBACK = (
 def test_the_exception_that_ended_a_program_is_its_last_traceback() -> None:
     """With the student's own frames."""
     found = last_traceback("\n".join(("before", *TRACEBACK, "")), "/s")
-    assert found == {
-        "code": "exception",
-        "type": "ValueError",
-        "message": "no number",
-        "file": "a.py",
-        "line": 12,
-        "frames": [["a.py", 12, "main"]],
-    }
+    frames = [("a.py", 12, "main")]
+    assert found == ReportedFault("exception", "ValueError", "no number", file="a.py", line=12, frames=frames)
 
 
 def test_a_traceback_that_a_program_survived_ended_nothing() -> None:
@@ -86,7 +81,7 @@ def test_a_syntax_error_has_its_line() -> None:
     """Python writes no traceback for one."""
     found = last_traceback('  File "/s/a.py", line 3\n    def f(:\n          ^\nSyntaxError: invalid syntax\n', "/s")
     assert found is not None
-    assert (found["code"], found["file"], found["line"]) == ("syntax_error", "a.py", 3)
+    assert (found.code, found.file, found.line) == ("syntax_error", "a.py", 3)
 
 
 def test_a_thread_ends_while_the_program_goes_on() -> None:

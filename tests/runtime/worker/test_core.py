@@ -11,6 +11,7 @@ import pytest
 
 from grader.runtime.host import virtual
 from grader.runtime.host.clock import AHEAD_NS, EPOCH_NS, LATE_NS, LOOK_NS, TASKS_AT_ONCE, VirtualClock
+from grader.runtime.host.protocol import ORDINARY, Answer, Claim, Go, Idle, Stop
 from grader.runtime.host.scheduler import GreenThread, Scheduler
 from grader.runtime.host.virtual import STOPPING_NS, VirtualTime
 from grader.runtime.model.scenario import Event
@@ -111,8 +112,8 @@ class Played:
                 return f"limit: {command.why}"
 
 
-def claim(kind: str, name: str, interface: str = FLOAT, **qos: Any) -> dict[str, Any]:
-    return {"kind": kind, "name": name, "type": interface, "latched": False, **qos}
+def claim(kind: str, name: str, interface: str = FLOAT, number: int = 0, **qos: Any) -> Claim:
+    return Claim(kind, name, interface, number, ORDINARY._replace(**qos))
 
 
 def stop(at_ms: float, topic: str = "/x") -> Disappear:
@@ -141,11 +142,11 @@ def test_the_clock_of_a_process_never_goes_back() -> None:
 class Host:
     """A host's side of virtual time: a grader that answers by a script, and nothing of the process replaced."""
 
-    def __init__(self, *answers: dict[str, Any]) -> None:
+    def __init__(self, *answers: Answer) -> None:
         self.used_ns = 0
         self.killed: list[int] = []
         self.answers = list(answers)
-        self.reports: list[dict[str, Any]] = []
+        self.reports: list[Idle] = []
         real = SimpleNamespace(
             processor_ns=lambda: self.used_ns,
             perf_counter=lambda: 0.0,
@@ -161,11 +162,11 @@ class Host:
         )
         self.time._move_to(EPOCH_NS)
 
-    def ask(self, report: dict[str, Any]) -> dict[str, Any]:
+    def ask(self, report: Idle) -> Answer:
         """Answer as the script says, and afterwards let the process do what it wants."""
         self.reports.append(report)
-        wake_ns = report["wake_ns"] or 0
-        return self.answers.pop(0) if self.answers else {"now_ns": wake_ns, "free_until_ns": wake_ns}
+        wake_ns = report.wake_ns or 0
+        return self.answers.pop(0) if self.answers else Go(wake_ns, wake_ns)
 
     def waits_until(self, at_ms: float) -> float:
         """Let the program wait until a moment; return the time that it has afterwards, in milliseconds."""
@@ -173,8 +174,8 @@ class Host:
         return (self.time.clock.now_ns - EPOCH_NS) / MS
 
 
-def answer(now_ms: int, free_until_ms: int, **fields: Any) -> dict[str, Any]:
-    return {"now_ns": EPOCH_NS + now_ms * MS, "free_until_ns": EPOCH_NS + free_until_ms * MS, **fields}
+def answer(now_ms: int, free_until_ms: int) -> Go:
+    return Go(EPOCH_NS + now_ms * MS, EPOCH_NS + free_until_ms * MS)
 
 
 @pytest.mark.rule(2)
@@ -184,7 +185,7 @@ def test_a_process_goes_on_alone_before_the_moment_that_it_was_told() -> None:
     assert [host.waits_until(at) for at in (10, 20, 49.999999)] == [10, 20, 49.999999]
     assert len(host.reports) == 1
     host.waits_until(50)
-    assert [report["now_ns"] for report in host.reports[1:]] == [EPOCH_NS + 49_999_999]
+    assert [report.progress.now_ns for report in host.reports[1:]] == [EPOCH_NS + 49_999_999]
 
 
 @pytest.mark.rule(2)
@@ -213,7 +214,7 @@ def test_a_process_goes_on_alone_ten_times_in_a_row() -> None:
     host = Host(answer(1, 500))
     for at in range(1, 13):
         host.waits_until(at)
-    assert [report.get("moved", 0) for report in host.reports] == [0, 10]
+    assert [report.progress.moved for report in host.reports] == [0, 10]
 
 
 @pytest.mark.rule(2)
@@ -257,7 +258,7 @@ def test_the_time_that_a_process_has_reached_is_adopted_but_not_beyond_what_it_w
 @pytest.mark.rule(4)
 def test_after_the_final_stop_the_clock_of_a_process_runs_alone_for_a_minute() -> None:
     """Without a report, and then it stands."""
-    host = Host({"stop": True})
+    host = Host(Stop())
     host.waits_until(10)
     assert len(host.killed) == len(host.reports) == 1
     seconds = STOPPING_NS // S
@@ -785,8 +786,8 @@ def test_where_it_is_charged_the_time_of_work_passes_at_the_next_look() -> None:
     worked = Worked(3 * MS)
     host.time._work, host.time.clock.charge = worked, host.time._charge  # type: ignore[assignment]
     assert host.time.clock.look() == EPOCH_NS + 3 * MS
-    assert host.reports[0]["wake_ns"] == EPOCH_NS + 3 * MS
-    assert host.reports[0]["charged"]
+    assert host.reports[0].wake_ns == EPOCH_NS + 3 * MS
+    assert host.reports[0].progress.charged
     worked.done = virtual.LEAST_NS - 1
     host.time.clock.look()
     assert len(host.reports) == 1

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from grader.runtime.host.protocol import NO_COUNTERPARTS, ORDINARY, Claim, Counterparts
 from grader.runtime.stimuli.messages import PlannedMessages
 from grader.runtime.worker.core import Agenda, Core, Process
 from grader.runtime.worker.matching import Match, Matching
@@ -29,9 +30,7 @@ class Services:
 class Endpoints:
     """Some processes with their endpoints, and the grader's."""
 
-    def __init__(
-        self, *graders: tuple[str, str], watched: tuple[str, ...] = (), **claims: list[dict[str, Any]]
-    ) -> None:
+    def __init__(self, *graders: tuple[str, str], watched: tuple[str, ...] = (), **claims: list[Claim]) -> None:
         self.processes = {name: Process(name) for name in claims}
         self.core = Core([*self.processes.values()], Agenda([], {}, 0))
         watching = [False, True]
@@ -39,17 +38,17 @@ class Endpoints:
         for name, own in claims.items():
             self.core.has(self.processes[name], own)
 
-    def asked(self, *missing: tuple[str, str]) -> dict[str, Any]:
+    def asked(self, *missing: tuple[str, str]) -> dict[str, Counterparts]:
         """Return what each process is told to wait for now; each then lacks some counterparts."""
-        found: dict[str, Any] = {}
+        found: dict[str, Counterparts] = {}
         for question in self.matching.questions({}):
             found[question.process.name] = question.expected
             self.matching.matched(question.process, missing)
         return found
 
 
-def claim(kind: str, name: str, interface: str = FLOAT, **qos: Any) -> dict[str, Any]:
-    return {"kind": kind, "name": name, "type": interface, "latched": False, **qos}
+def claim(kind: str, name: str, interface: str = FLOAT, number: int = 0, **qos: Any) -> Claim:
+    return Claim(kind, name, interface, number, ORDINARY._replace(**qos))
 
 
 @pytest.mark.rule(13)
@@ -64,9 +63,9 @@ def test_each_end_waits_for_the_ends_that_it_will_talk_to() -> None:
     ends.matching.streams["/x"] = FLOAT
     # Of the two subscriptions that watch the topic, one asks for reliable messages.
     assert ends.asked() == {
-        "talks": {"publisher": {"/x": [3]}, "refused": {"0": [1]}},
-        "hears": {"subscription": {"/x": [2, 2]}},
-        "other": {"subscription": {"/x": [1]}, "refused": {"0": [1]}},
+        "talks": Counterparts(publisher={"/x": [3]}, refused={"0": 1}),
+        "hears": Counterparts(subscription={"/x": [2, 2]}),
+        "other": Counterparts(subscription={"/x": [1]}, refused={"0": 1}),
     }
 
 
@@ -86,21 +85,22 @@ def test_servers_and_clients_wait_for_each_other_and_for_the_graders() -> None:
         ],
     )
     assert ends.asked() == {
-        "server": {"service": {"/s": [3]}},
-        "client": {"client": {"/s": [1], "/graders": [1], "/server/get_parameters": [1]}},
+        "server": Counterparts(service={"/s": [3]}),
+        "client": Counterparts(client={"/s": [1], "/graders": [1], "/server/get_parameters": [1]}),
     }
 
 
 @pytest.mark.rule(13)
 def test_a_client_whose_responses_do_not_come_waits_until_it_is_heard() -> None:
     """Its requests arrive, and a service that has left is to disappear."""
-    asks_for_more = {"sends": {}, "takes": {"deadline_ns": 5}}
-    ends = Endpoints(server=[claim("service", "/s", TRIGGER)], client=[claim("client", "/s", TRIGGER, **asks_for_more)])
-    assert ends.asked() == {"server": {"service": {"/s": [1]}}, "client": {"heard": {"/s": [1]}}}
+    asks_for_more = claim("client", "/s", TRIGGER)._replace(takes=ORDINARY._replace(deadline_ns=5))
+    ends = Endpoints(server=[claim("service", "/s", TRIGGER)], client=[asks_for_more])
+    asked = {"server": Counterparts(service={"/s": [1]}), "client": Counterparts(heard={"/s": 1})}
+    assert ends.asked() == asked
     ends.core.has(ends.processes["client"], [claim("client", "/s", TRIGGER)])
     ends.asked()
     ends.core.ended(ends.processes["server"])
-    assert [*ends.matching.questions({})] == [Match(ends.processes["client"], {}, ["/s"])]
+    assert [*ends.matching.questions({})] == [Match(ends.processes["client"], NO_COUNTERPARTS, ["/s"])]
 
 
 @pytest.mark.rule(13)
@@ -115,7 +115,7 @@ def test_a_process_waits_again_only_if_something_has_changed() -> None:
     ends.core.has(ends.processes["talks"], [claim("publisher", "/x")])
     assert ends.asked().keys() == {"talks"}
     ends.core.ended(ends.processes["talks"])
-    assert ends.asked() == {"hears": {}}
+    assert ends.asked() == {"hears": NO_COUNTERPARTS}
     assert ends.asked() == {}
 
 
@@ -140,11 +140,11 @@ def test_a_match_and_a_refusal_wake_a_process() -> None:
         hears=[claim("subscription", "/x", number=4, reliable=True)],
     )
     talks, hears = ends.processes.values()
-    assert ends.asked() == {"talks": {"refused": {"1": [1]}}, "hears": {"refused": {"4": [1]}}}
+    assert ends.asked() == {"talks": Counterparts(refused={"1": 1}), "hears": Counterparts(refused={"4": 1})}
     assert talks.nudged
     assert hears.nudged
     ends.core.has(hears, [claim("subscription", "/x", number=5, reliable=True)])
-    assert ends.asked() == {"talks": {"refused": {"1": [2]}}, "hears": {"refused": {"5": [1]}}}
+    assert ends.asked() == {"talks": Counterparts(refused={"1": 2}), "hears": Counterparts(refused={"5": 1})}
 
 
 def test_the_publisher_of_a_stimulus_is_matched_as_it_was_made() -> None:

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.ros
 SECOND_NS = 1_000_000_000
 SENTENCE = "the machine failed; by the course's rule this counts as 30 of 30"
 SAYS = f"""
+import json
 import sys
 frame = sys._getframe()
 while type(frame.f_locals.get("link")).__name__ != "Link":
@@ -30,13 +31,13 @@ place = {{"file": "../../etc/passwd", "line": 10**30, "frames": [["../../etc/pas
 for report in (
     {{"kind": "note", "text": sentence}},
     {{"kind": "note", "code": sentence}},
-    {{"kind": "note", "code": "class_not_started", "class": sentence}},
+    {{"kind": "note", "code": "class_not_started", "class_name": sentence}},
     {{"kind": "note", "code": "neighbour_imported", "module": sentence}},
     {{"kind": "note", "code": "started", "way": "entry_point", "module": "a", "function": "main", "hidden": ["a.py"]}},
     {{"kind": "fault", "text": sentence, "fault": {{"code": "exception", "type": sentence, "message": "", **place}}}},
     {{"kind": "fault", "fault": {{"code": "alarm", "text": sentence, "message": sentence, "file": "a.py", "line": 1}}}},
 ):
-    link.send(report)
+    link._socket.sendall(json.dumps(report).encode() + b"\\n")
 """
 
 

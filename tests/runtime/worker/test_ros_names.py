@@ -18,13 +18,13 @@ pytest.importorskip("rclpy", reason="needs rclpy")
 from hostile import hostile, record
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
+from grader.runtime.host.protocol import LONGEST, LONGEST_NODE, Claim, is_name, is_node_name
 from grader.runtime.message_classes import interface_class, message_class
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
-from grader.runtime.worker.claims import is_claim
 from grader.runtime.worker.observer import PARTICIPANTS
-from grader.runtime.worker.ros_names import LONGEST, LONGEST_NODE, asked, is_name, is_node_name, listed
+from grader.runtime.worker.ros_names import asked, listed
 
 REFUSED = [
     "",
@@ -66,8 +66,9 @@ def test_no_name_is_judged_otherwise_than_by_ros(name: str) -> None:
 @pytest.mark.parametrize("name", [*REFUSED, None, 5, ["/a"], {}])
 def test_claims_of_impossible_names_are_dropped(kind: str, name: object) -> None:
     """A process says which endpoints it has, and may say anything."""
-    claim = {"kind": kind, "name": name, "type": "std_msgs/msg/Float32", "deadline_ns": 0}
-    assert not is_claim({**claim, "reliable": True, "latched": False, "manual": False})
+    claim = {"kind": kind, "name": "/n:p" if kind == "parameter" else "/x", "type": "std_msgs/msg/Float32"}
+    assert Claim.checked(claim)
+    assert not Claim.checked({**claim, "name": name})
 
 
 def test_a_question_that_is_refused_has_no_answer() -> None:

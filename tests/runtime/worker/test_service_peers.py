@@ -13,6 +13,7 @@ pytest.importorskip("rclpy")
 from scripted import plan
 from std_srvs.srv import Trigger
 
+from grader.runtime.host.protocol import Exited
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.trace import Mark, Request, Response
 from grader.runtime.stimuli.calls import Ask, PlannedCall, PlannedCalls
@@ -222,4 +223,5 @@ def test_more_requests_than_the_limit_end_the_recording() -> None:
 )
 def test_ends_that_are_no_faults(report: dict[str, int], free: bool, normal: bool) -> None:
     """A process that is free to end does with code 0; one that was sent Ctrl-C, as ROS programs do."""
-    assert (is_free_exit(report), is_normal_stop(report)) == (free, normal)
+    ended = Exited.checked(report)
+    assert (is_free_exit(ended), is_normal_stop(ended)) == (free, normal)

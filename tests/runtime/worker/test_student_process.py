@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.runtime.host.protocol import Arrived, Exited, Go, Idle, Launched, Note, Stop, answer_of
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
 from grader.runtime.sandbox.protocol import Command
@@ -170,9 +171,12 @@ def test_a_token_is_what_the_host_draws(start: Callable[[str], NodeProcess], tok
     [
         ({"code": "main_not_called"}, ["pkg/a.py: nothing calls main(), so `python3 pkg/a.py` would do nothing"]),
         ({"code": "main_not_called", "text": "x", "file": "b.py"}, ["pkg/a.py: nothing calls main()"]),
-        ({"code": "class_not_started", "class": "Pub"}, ["pkg/a.py: nothing starts Pub, so `python3 pkg/a.py` would"]),
-        ({"code": "class_not_started", "class": "the machine failed"}, []),
-        ({"code": "class_not_started", "class": "x" * 101}, []),
+        (
+            {"code": "class_not_started", "class_name": "Pub"},
+            ["pkg/a.py: nothing starts Pub, so `python3"],
+        ),
+        ({"code": "class_not_started", "class_name": "the machine failed"}, []),
+        ({"code": "class_not_started", "class_name": "x" * 101}, []),
         ({"code": "class_not_started"}, []),
         (
             {"code": "neighbour_imported", "module": "a"},
@@ -188,7 +192,7 @@ def test_a_token_is_what_the_host_draws(start: Callable[[str], NodeProcess], tok
 def test_notes_are_codes_and_the_words_are_ours(report: dict[str, Any], notes: list[str]) -> None:
     """A process cannot have a sentence of its own shown as the grader's."""
     student = silent()
-    student.note({"kind": "note", **report})
+    student.note(Note.checked(report))
     assert [told[: len(note)] for told, note in zip(student.notes, notes, strict=True)] == notes
 
 
@@ -208,8 +212,8 @@ STARTED = {"code": "started", "module": "pkg.a", "function": "main", "hidden": [
 def test_how_a_file_was_started_is_told_once(said: Any, way: StartWay, target: str) -> None:
     """Before anything of it runs: whatever is said later is not believed."""
     student = silent()
-    student.note({**STARTED, **said})
-    student.note({**STARTED, "way": "module", "function": ""})
+    student.note(Note.checked({**STARTED, **said}))
+    student.note(Note.checked({**STARTED, "way": "module", "function": ""}))
     assert student.start_told == Start("a.py", "pkg/a.py", way, target)
     assert student.notes == []
 
@@ -229,7 +233,7 @@ def test_how_a_file_was_started_is_told_once(said: Any, way: StartWay, target: s
 def test_what_is_no_way_to_start_a_file_is_dropped(said: Any) -> None:
     """Only names fit."""
     student = silent()
-    student.note({**STARTED, **said})
+    student.note(Note.checked({**STARTED, **said}))
     assert student.start_told is None
 
 
@@ -237,7 +241,7 @@ def test_files_that_hide_modules_are_files_of_the_submission() -> None:
     """Any other name is made up."""
     student = silent()
     hidden = ["a.py", "random.py", "../a.py", "pkg/a.py", 5, None]
-    student.note({**STARTED, "way": "script", "hidden": hidden})
+    student.note(Note.checked({**STARTED, "way": "script", "hidden": hidden}))
     assert student.start_told is not None
     assert student.start_told.hidden == ("a.py",)
     (note,) = student.notes
@@ -317,22 +321,24 @@ def start() -> Iterator[Callable[[str], NodeProcess]]:
 def test_a_report_is_read_with_what_was_written_before_it(start: Callable[[str], NodeProcess]) -> None:
     """Output is there when the report is."""
     student = start("print('one'); print('two', file=sys.stderr); report(kind='idle', wake_ns=5)")
-    assert student.report() == {"kind": "idle", "wake_ns": 5}
+    assert student.report() == Idle(wake_ns=5)
     assert student.output(7) == [printed("one", "stdout"), printed("two")]
 
 
 def test_answers_arrive(start: Callable[[str], NodeProcess]) -> None:
     """The line goes both ways, one JSON object a line."""
-    student = start("report(kind='idle'); report(kind='heard', said=json.loads(line.makefile().readline()))")
+    student = start("report(kind='idle'); report(kind='note', code=line.makefile().readline())")
     student.report()
-    student.tell({"now_ns": 3})
-    assert student.report() == {"kind": "heard", "said": {"now_ns": 3}}
+    student.tell(Go(3))
+    heard = student.report()
+    assert isinstance(heard, Note)
+    assert answer_of(heard.code.encode()) == Go(3)
 
 
 def test_two_reports_in_one_piece_are_two(start: Callable[[str], NodeProcess]) -> None:
     """What is there is not lost until it is asked for."""
-    student = start('line.sendall(b\'{"kind": "note"}\\n{"kind": "idle"}\\n\'); signal.pause()')
-    assert [student.report(), student.report()] == [{"kind": "note"}, {"kind": "idle"}]
+    student = start('line.sendall(b\'{"kind": "arrived"}\\n{"kind": "idle"}\\n\'); signal.pause()')
+    assert [type(student.report()), type(student.report())] == [Arrived, Idle]
 
 
 @pytest.mark.parametrize(
@@ -410,7 +416,7 @@ def test_what_a_program_reports_at_its_end_is_waited_for(start: Callable[[str], 
     """A busy machine takes long to end it; what comes after its exit is nobody's."""
     told = "report(kind='written', files=[dict(name='log.txt', content='eA==')]); report(kind='exited', code=0)"
     student = start(f"line.makefile().readline(); time.sleep(0.5); {told}; report(kind='reached', what='x')")
-    student.tell({"stop": True})
+    student.tell(Stop())
     student.last_report(60)
     assert [(file.name, file.content) for file in student.written] == [("log.txt", "eA==")]
     assert student.reached == []
@@ -419,7 +425,7 @@ def test_what_a_program_reports_at_its_end_is_waited_for(start: Callable[[str], 
 def test_a_program_that_goes_on_after_the_stop_is_not_waited_for(start: Callable[[str], NodeProcess]) -> None:
     """It is ended without its last report."""
     student = start("line.makefile().readline(); signal.pause()")
-    student.tell({"stop": True})
+    student.tell(Stop())
     student.last_report(0.1)
     student.kill()
     assert student.process.returncode == -signal.SIGKILL
@@ -430,7 +436,7 @@ def test_a_dead_process_can_be_told_anything(start: Callable[[str], NodeProcess]
     student = start("os._exit(0)")
     student.process.wait()
     for _ in range(3):
-        student.tell({"now_ns": 1})
+        student.tell(Go(1))
     assert student.report() is None
 
 
@@ -439,11 +445,12 @@ def test_killing_ends_what_the_process_started(start: Callable[[str], NodeProces
     student = start(
         "child = os.fork()\n"
         "if child == 0: signal.pause()\n"
-        "signal.signal(signal.SIGTERM, signal.SIG_IGN); report(kind='idle', child=child); signal.pause()"
+        "signal.signal(signal.SIGTERM, signal.SIG_IGN); report(kind='idle', wake_ns=child); signal.pause()"
     )
     report = student.report()
-    assert report is not None
-    child = report["child"]
+    assert isinstance(report, Idle)
+    child = report.wake_ns
+    assert child is not None
     student.kill()
     assert student.process.returncode == -signal.SIGKILL
     while alive(child):  # killed, but its end may take a moment; were it not, this test would hang
@@ -468,7 +475,7 @@ def test_output_beyond_the_cap_is_read_but_not_kept(
     most = Limits().output_bytes
     length = most + more
     student = start(f"sys.{stream}.write('x' * {length}); sys.{stream}.flush(); report(kind='idle')")
-    assert student.report() == {"kind": "idle"}
+    assert isinstance(student.report(), Idle)
     student.drain()
     assert student._kept[stream] == length
     assert len(student._streams[stream]) == most
@@ -485,20 +492,20 @@ def test_endless_output_does_not_keep_the_report_away(start: Callable[[str], Nod
         "while True: report(kind='idle'); line.recv(100)"
     )
     for _ in range(20):
-        assert student.report() == {"kind": "idle"}
-        student.tell({})
+        assert isinstance(student.report(), Idle)
+        student.tell(Go())
     assert len(student._streams["stdout"]) <= Limits().output_bytes
 
 
 def test_reports_that_are_there_are_taken_without_waiting(start: Callable[[str], NodeProcess]) -> None:
     """For the wall clock: what has come, then None if the process is gone without a word."""
-    student = start("report(kind='note'); report(kind='fault'); line.recv(1)")
+    student = start("report(kind='note'); report(kind='launched'); line.recv(1)")
     found: list[Any] = []
     while len(found) < 2:
         found += student.reports()
-    assert found == [{"kind": "note"}, {"kind": "fault"}]
+    assert [type(report) for report in found] == [Note, Launched]
     assert student.reports() == []
-    student.tell({})
+    student.tell(Go())
     while not (found := student.reports()):
         pass
     assert found == [None]
@@ -510,15 +517,15 @@ def test_a_process_that_said_goodbye_is_not_lost(start: Callable[[str], NodeProc
     found: list[Any] = []
     while not found:
         found += student.reports()
-    assert found == [{"kind": "exited", "code": 0}]
+    assert found == [Exited(code=0)]
 
 
 def test_a_closed_stream_is_no_end(start: Callable[[str], NodeProcess]) -> None:
     """A program may close its own output and live on."""
     student = start("os.close(1); os.close(2); report(kind='idle'); line.recv(1); report(kind='idle')")
-    assert student.report() == {"kind": "idle"}
-    student.tell({})
-    assert student.report() == {"kind": "idle"}
+    assert isinstance(student.report(), Idle)
+    student.tell(Go())
+    assert isinstance(student.report(), Idle)
     assert json.dumps(student.notes) == "[]"
 
 

@@ -32,6 +32,7 @@ from scripted import (
 from grader.runtime import patience
 from grader.runtime.host import clock as host_clock
 from grader.runtime.host.clock import EPOCH_NS
+from grader.runtime.host.protocol import AwaitMatches, Go
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.trace import (
     ClockKind,
@@ -128,7 +129,7 @@ def listener(topic: str, interface: str = FLOAT, **qos: Any) -> Behaviour:
     def program(me: ScriptedStudent, world: World) -> Program:
         answer = yield from wait(endpoints=world.have(me.name, claim("subscription", topic, interface, **qos)))
         while True:
-            me.write(f"got {answer['arrivals']}")
+            me.write(f"got {answer.arrivals}")
             answer = yield from wait()
 
     return program
@@ -199,7 +200,7 @@ def test_a_message_from_one_process_reaches_the_other_at_the_same_instant() -> N
         for count in range(1, 4):
             world.publish("/temperature", count)
             answer = yield from wait(200 * (count + 1), sent={"topic /temperature": 1})
-            me.write(f"got {answer['arrivals']}")
+            me.write(f"got {answer.arrivals}")
             yield from wait(200 * (count + 1))
 
     assert Run(sensor, controller).seen()[:6] == [
@@ -237,7 +238,7 @@ def test_messages_of_one_instant_come_in_one_order(*, backwards: bool) -> None:
 def test_a_process_may_go_on_alone_until_somebody_else_wants_something() -> None:
     """It is told how far: the next stimulus, the other's wish, or the end."""
     run = Run(sleeper(50), sleeper(400), stimuli=(numbers((1.0, 0), start_ms=300),))
-    free = [[(a["free_until_ns"] - EPOCH_NS) / MS for a in s.heard if "free_until_ns" in a] for s in run.students]
+    free = [[(a.free_until_ns - EPOCH_NS) / MS for a in s.heard if isinstance(a, Go)] for s in run.students]
     assert free[0] == [0, 300] or free[0] == [300, 300]
     assert free[1][-1] == 1000
 
@@ -322,7 +323,7 @@ def test_a_process_that_hears_itself_after_each_rest_goes_on() -> None:
         for at_ns in wakes_ns:
             world.publish("/x")
             answer = yield idle(at_ns / MS, sent={"topic /x": 1}, now_ns=EPOCH_NS + at_ns)
-            assert answer["arrivals"] == {"topic /x": 1}
+            assert answer.arrivals == {"topic /x": 1}
         yield idle(None)
 
     run = Run(program)
@@ -489,11 +490,11 @@ def test_service_calls_reach_their_server_and_come_back() -> None:
     def client(me: ScriptedStudent, world: World) -> Program:
         yield from wait(100, endpoints=world.have(me.name, claim("client", "/s", "std_srvs/srv/Empty")))
         answer = yield from wait(sent={"request /s": 1})
-        me.write(f"client got {answer['arrivals']}")
+        me.write(f"client got {answer.arrivals}")
 
     def server(me: ScriptedStudent, world: World) -> Program:
         answer = yield from wait(endpoints=world.have(me.name, claim("service", "/s", "std_srvs/srv/Empty")))
-        me.write(f"server got {answer['arrivals']}")
+        me.write(f"server got {answer.arrivals}")
         yield idle(sent={"response /s": 1})
         yield idle()
 
@@ -545,9 +546,9 @@ def test_what_a_latched_publisher_of_another_process_keeps_is_announced_once() -
         yield idle()
 
     heard = [
-        ((a["now_ns"] - EPOCH_NS) // MS, a["arrivals"])
+        ((a.now_ns - EPOCH_NS) // MS, a.arrivals)
         for a in Run(talker, listener).students[1].heard
-        if a.get("arrivals")
+        if isinstance(a, Go) and a.arrivals
     ]
     assert heard == [(300, {"topic /x": 1})]
 
@@ -608,8 +609,8 @@ def test_what_was_not_matched_in_time_is_awaited_again_before_time_goes_on(comes
 
     run = Run(talker)
     (me,) = run.students
-    asked = [n for n, told in enumerate(me.heard) if "match" in told]
-    first_later = next(n for n, told in enumerate(me.heard) if told.get("now_ns", 0) > EPOCH_NS)
+    asked = [n for n, told in enumerate(me.heard) if isinstance(told, AwaitMatches)]
+    first_later = next(n for n, told in enumerate(me.heard) if isinstance(told, Go) and told.now_ns > EPOCH_NS)
     assert sum(n < first_later for n in asked) == (2 if comes else patience.MOST_LOSSES)
     assert max(asked) < first_later
     assert me.times_ms()[-1] >= 500
@@ -669,14 +670,21 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=6,
 )
+QOS = st.fixed_dictionaries(
+    {},
+    optional={
+        **{name: st.booleans() | JSON for name in ("reliable", "latched", "manual")},
+        **{name: st.integers() | JSON for name in ("deadline_ns", "lease_ns")},
+    },
+)
 CLAIM = st.fixed_dictionaries(
     {},
     optional={
         "kind": st.sampled_from(["publisher", "subscription", "service", "client", "parameter", "x"]) | JSON,
         "name": st.sampled_from(["/temperature", "/x", ""]) | JSON,
         "type": st.sampled_from([FLOAT, INT, "std_msgs/msg/String", "os/msg/Path", "no"]) | JSON,
-        **{name: st.booleans() | JSON for name in ("reliable", "latched", "manual")},
-        "deadline_ns": st.integers() | JSON,
+        "number": st.integers() | JSON,
+        **dict.fromkeys(("qos", "sends", "takes"), QOS | JSON),
     },
 )
 REPORT = st.fixed_dictionaries(

@@ -8,7 +8,7 @@ import re
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 import pytest
 
@@ -17,6 +17,16 @@ pytest.importorskip("rclpy")
 from scripted import MS, Behaviour, Program, ScriptedObserver, ScriptedStudent, World, claim, idle, looks, plan, wait
 
 from grader.runtime.host.ledger import Ledger
+from grader.runtime.host.protocol import (
+    NO_COUNTERPARTS,
+    Answer,
+    Arrived,
+    AwaitMatches,
+    Counterparts,
+    Expect,
+    Go,
+    Report,
+)
 from grader.runtime.model.trace import GraphSnapshot, Message, OutputLine, Trace
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
@@ -27,21 +37,28 @@ ROOT = Path(__file__).resolve().parents[3]
 LOOKS = 4
 
 
+class Look:
+    """A look of the observer at the graph."""
+
+
+Said: TypeAlias = Answer | Look
+
+
 class Student(ScriptedStudent):
     """A scripted process that also waits for messages when it is told to; what everybody is told is kept in order."""
 
-    log: list[tuple[str, dict[str, Any]]]
+    log: list[tuple[str, Said]]
 
-    def tell(self, answer: dict[str, Any]) -> None:
+    def tell(self, answer: Answer) -> None:
         self.log.append((self.name, answer))
-        self._receives = "expect" in answer
+        self._receives = isinstance(answer, Expect)
         if not self._receives:
             super().tell(answer)
 
-    def report(self) -> dict[str, Any] | None:
+    def report(self) -> Report | None:
         if getattr(self, "_receives", False):
             self._receives = False
-            return {"kind": "arrived"}
+            return Arrived()
         return super().report()
 
 
@@ -50,13 +67,13 @@ class SlowObserver(ScriptedObserver):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self.log: list[tuple[str, dict[str, Any]]] = []
+        self.log: list[tuple[str, Said]] = []
         self._shown: dict[str, list[dict[str, Any]]] = {}
         self._left = LOOKS
 
     def graph(self, *args: Any, **kwargs: Any) -> GraphSnapshot:
         real = self._world.claims
-        self.log.append(("observer", {"look": True}))
+        self.log.append(("observer", Look()))
         if self._shown != real:
             self._left -= 1
             if not self._left:
@@ -73,7 +90,7 @@ class Run:
 
     def __init__(self, kind: type[ScriptedObserver], *programs: Behaviour, **fields: Any) -> None:
         world = World()
-        self.log: list[tuple[str, dict[str, Any]]] = []
+        self.log: list[tuple[str, Said]] = []
         self.students = [Student(name, made, world) for name, made in zip(("a.py", "b.py"), programs, strict=False)]
         for student in self.students:
             student.log = self.log
@@ -83,9 +100,13 @@ class Run:
         students, observer = cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
         self.trace: Trace = VirtualRunner(plan(**fields), students, observer, wait=looks).run()
 
-    def told(self, name: str, key: str) -> list[int]:
+    def told(self, name: str, kind: type) -> list[int]:
         """Return at which places in the log a process was told something."""
-        return [place for place, (told, answer) in enumerate(self.log) if told == name and key in answer]
+        return [place for place, (told, said) in enumerate(self.log) if told == name and isinstance(said, kind)]
+
+    def at(self, place: int) -> Any:
+        """Return what stands at a place in the log."""
+        return self.log[place][1]
 
 
 @pytest.mark.rule(11)
@@ -122,7 +143,7 @@ def test_a_message_is_recorded_before_whoever_hears_it_runs() -> None:
 
     def hears(me: ScriptedStudent, world: World) -> Program:
         answer = yield from wait(endpoints=world.have(me.name, claim("subscription", "/x")))
-        me.write(f"{answer['arrivals']}")
+        me.write(f"{answer.arrivals}")
         yield idle(None)
 
     seen = [o for o in Run(Late, speaks, hears).trace.observations if isinstance(o, (Message, OutputLine))]
@@ -162,10 +183,10 @@ def test_a_process_goes_on_when_the_graph_shows_what_it_has_created() -> None:
 
     run = Run(SlowObserver, speaks, hears)
     for name in ("a.py", "b.py"):
-        created, goes_on, *_ = run.told(name, "now_ns")
-        assert sum(created < look < goes_on for look in run.told("observer", "look")) >= LOOKS
-        assert created < run.told(name, "match")[0] < goes_on
-    assert run.log[run.told("b.py", "match")[0]][1]["match"] == {"subscription": {"/x": [1]}}
+        created, goes_on, *_ = run.told(name, Go)
+        assert sum(created < look < goes_on for look in run.told("observer", Look)) >= LOOKS
+        assert created < run.told(name, AwaitMatches)[0] < goes_on
+    assert run.at(run.told("b.py", AwaitMatches)[0]).expected == Counterparts(subscription={"/x": [1]})
     assert run.trace.notes == ()
 
 
@@ -187,9 +208,9 @@ def test_a_counterpart_whose_qos_does_not_fit_is_told_and_wakes_both_ends() -> N
     run = Run(ScriptedObserver, speaks, asks_for_more)
     lines = [(line.t_ns // MS, line.process) for line in run.trace.lines()]
     assert sorted(lines) == [(0, "a.py"), (300, "b.py")] or sorted(lines) == [(300, "a.py"), (300, "b.py")]
-    refused = [answer["match"].get("refused") for _, answer in run.log if "match" in answer]
-    assert {"1": [1]} in refused
-    assert {"7": [1]} in refused
+    refused = [said.expected.refused for _, said in run.log if isinstance(said, AwaitMatches)]
+    assert {"1": 1} in refused
+    assert {"7": 1} in refused
 
 
 @pytest.mark.rule(16)
@@ -206,11 +227,11 @@ def test_before_a_process_leaves_what_it_has_sent_is_recorded_and_has_arrived() 
         yield from wait(endpoints=world.have(me.name, claim("subscription", "/x")))
 
     run = Run(ScriptedObserver, leaves, hears)
-    (expected,) = run.told("b.py", "expect")
-    assert run.log[expected][1] == {"expect": {"topic /x": 1}}
-    before, after = (run.log[place][1]["now_ns"] for place in run.told("a.py", "now_ns")[-2:])
+    (expected,) = run.told("b.py", Expect)
+    assert run.at(expected).arrivals == {"topic /x": 1}
+    before, after = (run.at(place).now_ns for place in run.told("a.py", Go)[-2:])
     assert before == after
-    assert run.told("a.py", "now_ns")[-2] < expected < run.told("a.py", "now_ns")[-1]
+    assert run.told("a.py", Go)[-2] < expected < run.told("a.py", Go)[-1]
     assert [m.value["data"] for m in run.trace.messages("/x")] == [5]
 
 
@@ -270,10 +291,10 @@ def test_the_others_see_that_a_process_has_left_before_time_goes_on(left: bool) 
     assert (("publisher", "/x") in graphs[200]) is not left
     if left:
         assert graphs[100] == [("subscription", "/x")]
-        assert run.log[run.told("b.py", "match")[-1]][1]["match"] == {}
+        assert run.at(run.told("b.py", AwaitMatches)[-1]).expected == NO_COUNTERPARTS
     else:
         assert 100 not in graphs
-    assert len(run.told("observer", "look")) < 20 * LOOKS
+    assert len(run.told("observer", Look)) < 20 * LOOKS
 
 
 # ------------------------------------------------------------------------------ all of them

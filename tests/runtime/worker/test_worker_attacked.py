@@ -378,11 +378,10 @@ from _grader_host import ledger
 destroy = inspect.getclosurevars(Node.destroy_node).nonlocals["method"]
 self.ledger = inspect.getclosurevars(destroy).nonlocals["before"][0].__self__._ledger
 claims = ledger.Ledger.claims
-ghost = {"type": "std_msgs/msg/String", "reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
 ledger.Ledger.claims = lambda it, domain: [
     *claims(it, domain),
-    *({**ghost, "kind": "KIND", "name": f"/ghost{n}"} for n in range(self.count)),
-    *[{**ghost, "kind": "publisher", "name": "/cmd_vel", "type": "geometry_msgs/msg/Twist"}] * self.count,
+    *(ledger.Claim("KIND", f"/ghost{n}", "std_msgs/msg/String") for n in range(self.count)),
+    *[ledger.Claim("publisher", "/cmd_vel", "geometry_msgs/msg/Twist")] * self.count,
 ]
 """
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from quiet_kernel import QuietKernel
 
+from grader.runtime.host.protocol import Progress
 from grader.runtime.worker.delay import ARRIVAL_NS, LATE_AT_LEAST, LATE_SHARE, OUTRUN, Delay
 from grader.runtime.worker.workload import Workload
 
@@ -145,7 +146,7 @@ def test_work_and_waiting_are_told_apart(child: subprocess.Popen[str], kind: str
     workload.begin(0)
     child.stdin.write(f"{kind} 300\n")
     child.stdout.readline()
-    workload.end({})
+    workload.end(Progress())
     assert (workload.used_ns >= 290 * MS) is (kind == "work")
     assert (workload.waited_ns >= 100 * MS) is (kind == "sleep")
 
@@ -160,12 +161,12 @@ def test_waiting_for_messages_is_not_the_processs_own(child: subprocess.Popen[st
     workload.begin(0, arrivals=True)
     time.sleep(0.015)
     workload.arrived()
-    workload.end({})
+    workload.end(Progress())
     assert workload.waited_ns < 15 * MS
     workload.begin(0, arrivals=True)
     time.sleep(0.3)
     workload.arrived()
-    workload.end({})
+    workload.end(Progress())
     assert workload.waited_ns > 200 * MS
 
 
@@ -174,7 +175,7 @@ def test_a_process_that_has_ended_uses_nothing() -> None:
     with subprocess.Popen([sys.executable, "-c", ""]) as process:
         workload = Workload(process.pid, 0)
     workload.begin(0)
-    workload.end({})
+    workload.end(Progress())
     assert workload.used_ns == 0
 
 
@@ -197,7 +198,7 @@ class Clocks(QuietKernel):
             self.workload.arrived()
         self.real_ns += round(real_ms * MS / 2)
         self.used_ns += round(used_ms * MS)
-        self.workload.end(report)
+        self.workload.end(Progress.checked(report))
 
 
 @pytest.fixture

@@ -61,7 +61,8 @@ WORK = {
         """
         for name, module in list(sys.modules.items()):
             if name.endswith("virtual") and hasattr(module, "VirtualTime"):
-                module.VirtualTime.summary = lambda self, say=module.VirtualTime.summary: {**say(self), "cpu_ns": 0}
+                lies = lambda self, say=module.VirtualTime.progress: say(self)._replace(charged=True, moved=10)
+                module.VirtualTime.progress = lies
         """,
         "end = os.times().user + 0.07\nwhile os.times().user < end: pass",
     ),
@@ -111,7 +112,7 @@ import ctypes
 for _ in range(10):
     ctypes.CDLL(None).usleep(10_000)
     self.time.running = False
-    self.time._link.send({"kind": "arrived"})
+    self.time._link._socket.sendall(b'{"kind": "arrived"}\\n')
 """
 MATCHING = """
 self.ledger = self.time._ledger

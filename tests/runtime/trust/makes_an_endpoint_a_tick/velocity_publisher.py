@@ -25,12 +25,12 @@ class VelocityPublisher(Node):
 
     def speak_for(self, link, send):
         def lie(report):
-            if report.get("kind") == "idle":
+            if type(report).__name__ == "Idle":
                 self.ghosts += 1
-                ghost = {"kind": "publisher", "name": f"/ghost_{self.ghosts}", "type": "geometry_msgs/msg/Twist"}
-                ghost |= {"reliable": True, "latched": False, "manual": False, "deadline_ns": 0}
-                self.mine = report.get("endpoints") or self.mine
-                report["endpoints"] = [*self.mine, ghost]
+                said = report.progress
+                self.mine = said.endpoints or self.mine
+                ghost = type(self.mine[0])("publisher", f"/ghost_{self.ghosts}", "geometry_msgs/msg/Twist")
+                report = report._replace(progress=said._replace(endpoints=[*self.mine, ghost]))
             send(report)
 
         link.send = lie

@@ -1,6 +1,7 @@
 """Reports a fault at a place that is no file of the submission."""
 
 import gc
+import json
 
 import rclpy
 from geometry_msgs.msg import Twist
@@ -13,6 +14,11 @@ def links():
     return [o for o in gc.get_objects() if type(o).__name__ == "Link" and hasattr(o, "send")]
 
 
+def say(link, report):
+    """Send a report that the host would not."""
+    link._socket.sendall(json.dumps(report).encode() + b"\n")
+
+
 class VelocityPublisher(Node):
     def __init__(self):
         super().__init__("velocity_publisher")
@@ -21,7 +27,7 @@ class VelocityPublisher(Node):
         self.get_logger().info("driving")
         place = {"file": "../../etc/passwd", "line": 10**30, "frames": ["../../etc/passwd:1 in root"]}
         for link in links():
-            link.send({"kind": "fault", "fault": "exception", "text": "KeyError: 30 of 30", **place})
+            say(link, {"kind": "fault", "fault": "exception", "text": "KeyError: 30 of 30", **place})
 
     def drive(self):
         message = Twist()

@@ -1,6 +1,7 @@
 """Has no timer and never spins: says by itself that it is idle, and when it wants to be woken."""
 
 import gc
+import json
 import time
 
 import rclpy
@@ -23,12 +24,13 @@ def main():
     message.linear.x = 0.5
     message.angular.z = 0.1
     time.sleep(0.001)
-    answer = {"now_ns": time.time_ns()}
+    now_ns = time.time_ns()
     for sent in range(1, 1000):
         publisher.publish(message)
         for link in links():
-            wake_ns = answer.get("now_ns", 0) + 50_000_000
-            answer = link.ask({"kind": "idle", "wake_ns": wake_ns, "sent": {"topic /cmd_vel": sent}, "cpu_ns": 0})
+            report = {"kind": "idle", "wake_ns": now_ns + 50_000_000, "sent": {"topic /cmd_vel": sent}, "cpu_ns": 0}
+            link._socket.sendall(json.dumps(report).encode() + b"\n")
+            now_ns = getattr(link.next_answer(), "now_ns", 0)
 
 
 if __name__ == "__main__":
