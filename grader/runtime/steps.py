@@ -94,14 +94,14 @@ class Simulate:
         number: Names it in questions.
         period_ns: Time between two steps.
         publishes: Topics with their types.
-        hears: Topics with their types.
+        hears: Topics, each with the types that it takes.
         serves: Services with their types.
     """
 
     number: int
     period_ns: int
     publishes: Mapping[str, str]
-    hears: Mapping[str, str]
+    hears: Mapping[str, tuple[str, ...]]
     serves: Mapping[str, str]
 
 

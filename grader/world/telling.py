@@ -24,7 +24,7 @@ from grader.runtime.model.trace import (
     ServiceEnd,
     unmet_policy,
 )
-from grader.runtime.simulation import Simulation
+from grader.runtime.simulation import Simulation, types_heard
 from grader.world.errors import NoMessage, StepTimeout
 from grader.world.programs import Program
 
@@ -121,7 +121,7 @@ class Sides(NamedTuple):
     """What the test or a simulation does: the ends of its publishers, and types of what it hears and serves by name."""
 
     publishers: Iterable[Endpoint]
-    hears: Mapping[str, str]
+    hears: Mapping[str, tuple[str, ...]]
     serves: Mapping[str, str]
     who: str = "the test"
 
@@ -130,7 +130,7 @@ def sides_of(simulation: Simulation) -> Sides:
     """Return what a simulation does; its publishers are reliable and volatile."""
     who, published = "the simulation", simulation.publishes().items()
     ends = [Endpoint("publisher", topic, kind, who, -1, "reliable", "volatile") for topic, kind in published]
-    return Sides(ends, simulation.hears(), simulation.serves(), who)
+    return Sides(ends, types_heard(simulation.hears()), simulation.serves(), who)
 
 
 def mismatches(graph: GraphSnapshot, sides: Iterable[Sides]) -> Iterator[str]:
@@ -141,23 +141,25 @@ def mismatches(graph: GraphSnapshot, sides: Iterable[Sides]) -> Iterator[str]:
     for one in sides:
         for offer in one.publishers:
             same = [e for e in graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
-            yield from _mismatch(same, offer.topic, offer.type, f"{offer.node} publishes", "subscribes to")
+            yield from _mismatch(same, offer.topic, (offer.type,), f"{offer.node} publishes", "subscribes to")
             fitting = [(e, unmet_policy(offer, e)) for e in same if e.type == offer.type]
             if fitting and all(unmet for _, unmet in fitting):
                 end, unmet = fitting[0]
                 offered, wanted = unmet or ("", "")
                 yield f"{offer.topic}: {end.node} asks for {wanted}, {offer.node} offers {offered}: no message arrives"
-        for topic, kind in one.hears.items():
+        for topic, kinds in one.hears.items():
             same = [e for e in graph.endpoints if (e.kind, e.topic) == ("publisher", topic)]
-            yield from _mismatch(same, topic, kind, f"{one.who} hears", "publishes")
+            yield from _mismatch(same, topic, kinds, f"{one.who} hears", "publishes")
         for service, kind in one.serves.items():
             clients = [e for e in service_ends(graph, "client") if e.service == service]
-            yield from _mismatch(clients, service, kind, f"{one.who} serves", "has a client of")
+            yield from _mismatch(clients, service, (kind,), f"{one.who} serves", "has a client of")
 
 
-def _mismatch(ends: Sequence[Endpoint | ServiceEnd], name: str, kind: str, here: str, there: str) -> Iterator[str]:
-    if ends and all(end.type != kind for end in ends):
-        yield f"{name}: {here} {kind}, {ends[0].node} {there} {ends[0].type}"
+def _mismatch(
+    ends: Sequence[Endpoint | ServiceEnd], name: str, kinds: Sequence[str], here: str, there: str
+) -> Iterator[str]:
+    if ends and all(end.type not in kinds for end in ends):
+        yield f"{name}: {here} {' or '.join(kinds)}, {ends[0].node} {there} {ends[0].type}"
 
 
 def apart(graph: GraphSnapshot) -> Iterator[str]:

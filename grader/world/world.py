@@ -44,7 +44,7 @@ from grader.runtime.serialization import (
     type_of_part,
 )
 from grader.runtime.session import RecordingSession, SteppedRun
-from grader.runtime.simulation import Moment, Simulation
+from grader.runtime.simulation import Moment, Simulation, types_heard
 from grader.runtime.simulation.loading import made
 from grader.runtime.steps import (
     Advance,
@@ -618,9 +618,9 @@ class World:
         number = len(self._simulations)
         self._simulations.append(simulation)
         simulation.begin(Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
-        offers = simulation.publishes(), simulation.hears(), simulation.serves()
+        publishes, hears, serves = simulation.publishes(), types_heard(simulation.hears()), simulation.serves()
         self._fits = False
-        self._perform(Simulate(number, simulation.period, *map(dict, offers)))
+        self._perform(Simulate(number, simulation.period, dict(publishes), hears, dict(serves)))
         return simulation
 
     # --------------------------------------------------------------- looking

@@ -17,10 +17,12 @@ from grader.grading.rubrics.check_parameters import Manual, manual_of
 from grader.grading.rubrics.draws import First
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import own_checks
+from grader.grading.rubrics.simulations import offered_by
 from grader.grading.rubrics.units import format_quantity
 from grader.runtime.model.errors import GraderError
 from grader.runtime.model.quantities import Unit, duration
-from grader.runtime.model.scenario import Connection, Scenario
+from grader.runtime.model.scenario import Connection, Scenario, Stimulus
+from grader.runtime.model.wording import listed
 from grader.runtime.stimuli import time_phrase
 
 #: Most names suggested for an unknown one.
@@ -155,8 +157,14 @@ def _situation(scenario: Scenario) -> str:
     if span.after_first_message_on:
         text += f" from the first message on {span.after_first_message_on} on"
         text += f", which is waited for at most {duration(span.wait_at_most_ns)}"
-    told = (stimulus.phrase() for stimulus in scenario.stimuli)
+    told = map(_stimulus, scenario.stimuli)
     return "; ".join([text, *told, *map(_connection, scenario.connections)])
+
+
+def _stimulus(stimulus: Stimulus) -> str:
+    """Describe what the grader does; of a simulation also what it hears."""
+    hears = [f"{' or '.join(types)} on {topic}" for one in offered_by([stimulus]) for topic, types in one.hears.items()]
+    return f"{stimulus.phrase()}: it hears {listed(hears, 'and')}" if hears else stimulus.phrase()
 
 
 def _connection(connection: Connection) -> str:

@@ -12,6 +12,7 @@ from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, is_asked
 from grader.grading.judging.figures import excerpts_for, illustrated
 from grader.grading.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
 from grader.grading.judging.run_check import Answer, check_name, run_check
+from grader.grading.judging.simulations import unheard_by_simulations
 from grader.grading.judging.values import HIDDEN_TOPICS, on_student_topic
 from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome, named, roles_of, variant_notes
 from grader.grading.model.report import (
@@ -147,7 +148,11 @@ def _tried(exercise: Exercise, case: Case, rules: Sequence[Rule], mistakes: list
 def _notes(
     recorded: list[tuple[str, Trace]], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[str, ...]:
-    found = (note for _, t in recorded for note in (*started(t), *same_names(t), *unheard(t), *t.notes))
+    found = (
+        note
+        for _, t in recorded
+        for note in (*started(t), *same_names(t), *unheard(t), *unheard_by_simulations(t), *t.notes)
+    )
     notes = tuple(dict.fromkeys(found))
     return notes if sources is None else placed(notes, submission, sources)
 

@@ -15,6 +15,7 @@ from grader.grading.judging.diagnosis import hint_for, placed_in
 from grader.grading.judging.diagnosis.silence import taken_from_executor
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package
 from grader.grading.judging.judge_run import same_names, started, unheard, unserved
+from grader.grading.judging.simulations import unheard_by_simulations
 from grader.grading.judging.source import read
 from grader.grading.judging.values import as_number, published, student_endpoints
 from grader.grading.model.report import Pace, Summary, TopicSummary
@@ -53,7 +54,7 @@ def summarise(
     caught = _caught(trace)
     faults = (*trace.faults(), *caught)
     told = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served), *_stateless(trace))
-    seen = (*told, *_taken(trace, sources))
+    seen = (*told, *unheard_by_simulations(trace), *_taken(trace, sources))
     notes = (*seen, *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(

@@ -284,7 +284,7 @@ class _Checked:
             yield _Named(getattr(stimulus, "type", ""), where), on
 
         for path, offered_ in self._simulated:
-            for on, type_ in {**offered_.publishes, **offered_.hears, **offered_.serves}.items():
+            for on, type_ in offered_.ends():
                 yield _Named(type_, self._tree.at_key(path)), on
 
     def _of_checks(self) -> Iterator[tuple[_Named, str]]:

@@ -16,7 +16,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.scenario import Between, Choose, FieldSpec, Stimulus, Written
 from grader.runtime.model.wording import shown
-from grader.runtime.simulation import SHORTEST_PERIOD_NS, Moment, Output
+from grader.runtime.simulation import SHORTEST_PERIOD_NS, Moment, Output, types_heard
 from grader.runtime.simulation.loading import begin_of, guarded, made
 from grader.runtime.stimuli import Simulated
 
@@ -29,14 +29,20 @@ class Offered:
     """What a simulation publishes, hears and serves, by name and type, and what it publishes in its first steps."""
 
     publishes: Mapping[str, str]
-    hears: Mapping[str, str]
+    hears: Mapping[str, tuple[str, ...]]
     serves: Mapping[str, str]
     outputs: tuple[Output, ...]
 
     @property
     def types(self) -> set[str]:
         """The types of all of it."""
-        return {*self.publishes.values(), *self.hears.values(), *self.serves.values()}
+        return {type_ for _, type_ in self.ends()}
+
+    def ends(self) -> Iterator[tuple[str, str]]:
+        """Yield the topics and services with their types: a topic once for each type that it hears there."""
+        yield from self.publishes.items()
+        yield from ((topic, type_) for topic, types in self.hears.items() for type_ in types)
+        yield from self.serves.items()
 
 
 def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
@@ -62,6 +68,7 @@ def offered(simulated: Simulated) -> Offered:
         call(lambda method=method: dict(getattr(one, method)()), begin_of(one, method, simulated.path))  # type: ignore[misc]
         for method in ("publishes", "hears", "serves")
     )
+    hears = types_heard(hears)
     outputs: list[Output] = []
     for number in range(STEPS):
         now = Moment(number * one.period, number * one.period)

@@ -6,16 +6,18 @@ A rubric uses one as a stimulus: `simulation: {differential_drive: {x: {between:
 writes another as a class in a file that the rubric lists under `simulations`.
 """
 
-from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output, Simulation
+from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Hears, Moment, Output, Simulation, types_heard
 from grader.runtime.simulation.robots import SIMULATIONS, DifferentialDrive, Turtle, Unicycle
 
 __all__ = [
     "SHORTEST_PERIOD_NS",
     "SIMULATIONS",
     "DifferentialDrive",
+    "Hears",
     "Moment",
     "Output",
     "Simulation",
     "Turtle",
     "Unicycle",
+    "types_heard",
 ]

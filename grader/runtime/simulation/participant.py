@@ -11,6 +11,8 @@ from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, seconds
 
 #: The shortest time between two steps of a simulation: no sensor is faster, and each step takes the grader's time.
 SHORTEST_PERIOD_NS = NS_PER_MS
+#: The topics that a simulation listens to, each with the message type that it takes, or with several.
+Hears = Mapping[str, str | tuple[str, ...]]
 #: A message to publish: its topic, and its fields as plain values, nested by name; fields left out keep their defaults.
 Output = tuple[str, Mapping[str, Any]]
 
@@ -51,8 +53,11 @@ class Simulation:
         """Return the topics that it publishes on, with their message types."""
         return {}
 
-    def hears(self) -> Mapping[str, str]:
-        """Return the topics that it listens to, with their message types; messages of another type are not for it."""
+    def hears(self) -> Hears:
+        """Return the topics that it listens to, with their message types; messages of another type are not for it.
+
+        A topic on which it understands several types has a tuple of them.
+        """
         return {}
 
     def serves(self) -> Mapping[str, str]:
@@ -83,3 +88,8 @@ class Simulation:
     def on_request(self, now: Moment, service: str, request: Mapping[str, Any]) -> Mapping[str, Any]:
         """Answer a request of a student's client, and return the fields of the response."""
         return {}
+
+
+def types_heard(hears: Hears) -> dict[str, tuple[str, ...]]:
+    """Return the types that a simulation takes on each topic."""
+    return {topic: (types,) if isinstance(types, str) else tuple(types) for topic, types in hears.items()}

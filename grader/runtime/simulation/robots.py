@@ -10,7 +10,7 @@ from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, DurationNs, Topic, seconds
-from grader.runtime.simulation.participant import Moment, Output, Simulation
+from grader.runtime.simulation.participant import Hears, Moment, Output, Simulation
 
 #: Larger numbers in commands count as this.
 LARGEST = 1e6
@@ -80,10 +80,13 @@ class Unicycle(Simulation):
 
 @dataclass
 class DifferentialDrive(Unicycle):
-    """A robot with two wheels: geometry_msgs/msg/Twist in, nav_msgs/msg/Odometry out.
+    """A robot with two wheels: geometry_msgs/msg/Twist or TwistStamped in, nav_msgs/msg/Odometry out.
 
     Attributes:
         commands: Topic of the commands: linear.x in m/s, angular.z in rad/s.
+        twist: Whether it hears geometry_msgs/msg/Twist.
+        twist_stamped: Whether it hears geometry_msgs/msg/TwistStamped, which robots of ROS 2 Jazzy hear by default; the
+            time in its header is not looked at.
         odometry: Topic of the odometry: position in m, orientation as a quaternion, twist in the robot's own frame.
         max_speed: Largest speed, forward or backward, in m/s.
         max_turn_rate: Largest turn rate, in rad/s.
@@ -97,6 +100,8 @@ class DifferentialDrive(Unicycle):
     """
 
     commands: Topic = "/cmd_vel"
+    twist: bool = True
+    twist_stamped: bool = False
     odometry: Topic = "/odom"
     max_speed: float = 10.0
     max_turn_rate: float = 10.0
@@ -109,6 +114,11 @@ class DifferentialDrive(Unicycle):
     period: DurationNs = 50 * NS_PER_MS
     _draw: random.Random = field(default_factory=random.Random, init=False, repr=False)
 
+    def __post_init__(self) -> None:
+        """Refuse a robot that nobody can command."""
+        if not (self.twist or self.twist_stamped):
+            raise ValueError("expected `twist` or `twist_stamped`, found neither")
+
     def publishes(self) -> Mapping[str, str]:
         """Return the odometry, and perhaps the transforms."""
         return {
@@ -116,9 +126,10 @@ class DifferentialDrive(Unicycle):
             **({"/tf": "tf2_msgs/msg/TFMessage"} if self.transforms else {}),
         }
 
-    def hears(self) -> Mapping[str, str]:
+    def hears(self) -> Hears:
         """Return the topic of the commands."""
-        return {self.commands: "geometry_msgs/msg/Twist"}
+        asked = {"geometry_msgs/msg/Twist": self.twist, "geometry_msgs/msg/TwistStamped": self.twist_stamped}
+        return {self.commands: tuple(type_ for type_, heard in asked.items() if heard)}
 
     def begin(self, draw: random.Random) -> None:
         """Keep the source of the noise."""
@@ -142,7 +153,7 @@ class DifferentialDrive(Unicycle):
     def on_message(self, now: Moment, topic: str, message: Mapping[str, Any]) -> Iterable[Output]:
         """Obey a command."""
         del topic
-        self.command(now, message)
+        self.command(now, message.get("twist", message))
         return ()
 
     def obeys_for_ns(self) -> int:
@@ -187,7 +198,7 @@ class Turtle(Unicycle):
         """Return the poses."""
         return {f"/{self.name}/pose": "turtlesim/msg/Pose"}
 
-    def hears(self) -> Mapping[str, str]:
+    def hears(self) -> Hears:
         """Return the topic of the commands."""
         return {f"/{self.name}/cmd_vel": "geometry_msgs/msg/Twist"}
 

@@ -59,6 +59,9 @@ class Runner(ABC):
         self._agenda = Agenda(due, dict(plan.starts_ns), end_ns)
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
         self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
+        self._recorder.add(
+            *(Mark(0, "simulation_hears", f"{topic} {type_}") for topic, type_ in self._simulations.heard())
+        )
         self._services = ServicePeers(
             plan,
             observer.services,

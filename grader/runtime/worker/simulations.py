@@ -17,7 +17,7 @@ from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.scenario import Event
 from grader.runtime.plan import Plan
 from grader.runtime.simulation.loading import SimulationError, begin_of, guarded, made
-from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output, Simulation
+from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output, Simulation, types_heard
 from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
 from grader.runtime.stimuli.server import AddServer, PlannedServer
 from grader.runtime.stimuli.simulation import PlannedSimulation, Step
@@ -51,6 +51,10 @@ class Simulations:
         """Whether there is any."""
         return bool(self._all)
 
+    def heard(self) -> Iterator[tuple[str, str]]:
+        """Yield the topics that simulations listen to, with each of the types that one takes."""
+        yield from ((topic, type_) for one in self._all for topic, types in one.hears.items() for type_ in types)
+
     def events(self) -> list[Event]:
         """Return the events that create what the simulations offer, and their first steps."""
         return [e for number, one in enumerate(self._all) for e in (*one.appearances(0), Step(0, number))]
@@ -77,7 +81,7 @@ class Simulations:
 
     def hear(self, taken: Taken, now: Moment) -> list[Event]:
         """Hand a message of a student's node to the simulations that listen to its topic; return what they publish."""
-        listening = [one for one in self._all if taken.value and one.hears.get(taken.topic) == taken.type]
+        listening = [one for one in self._all if taken.value and taken.type in one.hears.get(taken.topic, ())]
         return [event for one in listening for event in one.hear(taken, self._after(now))]
 
     def answer(self, service: str, request: Mapping[str, Any], now: Moment) -> Mapping[str, Any] | None:
@@ -99,7 +103,7 @@ class _Running:
         self._left = most
         self.simulation = begun or made(planned.name, planned.path, planned.content, planned.parameters)
         self.period_ns = max(SHORTEST_PERIOD_NS, self.simulation.period)
-        self.hears = self._call(lambda: dict(self.simulation.hears()), "hears")
+        self.hears = self._call(lambda: types_heard(self.simulation.hears()), "hears")
         self.serves = self._call(lambda: dict(self.simulation.serves()), "serves")
         self._streams = {
             topic: PlannedMessages(topic, type_, 0, 0, self.period_ns, 0, best_effort=False, latched=False, values=())

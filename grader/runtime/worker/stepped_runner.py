@@ -314,7 +314,7 @@ class _Elsewhere(Simulation):
     def publishes(self) -> Mapping[str, str]:
         return self._command.publishes
 
-    def hears(self) -> Mapping[str, str]:
+    def hears(self) -> Mapping[str, tuple[str, ...]]:
         return self._command.hears
 
     def serves(self) -> Mapping[str, str]:

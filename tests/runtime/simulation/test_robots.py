@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.runtime.model.quantities import NS_PER_S, nanoseconds
-from grader.runtime.simulation import DifferentialDrive, Moment, Output, Simulation, Turtle, Unicycle
+from grader.runtime.simulation import DifferentialDrive, Moment, Output, Simulation, Turtle, Unicycle, types_heard
 
 
 def at(t_s: float) -> Moment:
@@ -117,6 +117,19 @@ def test_a_turtle_stays_in_its_field_and_obeys_for_a_second() -> None:
     pose = fields(turtle.step(at(3.5)), "/turtle1/pose")
     assert pose["x"] == turtle.x
     assert pose.keys() == {"x", "y", "theta", "linear_velocity", "angular_velocity"}
+
+
+@pytest.mark.parametrize("types", [("Twist",), ("TwistStamped",), ("Twist", "TwistStamped")])
+def test_a_robot_hears_the_types_that_it_is_given(types: tuple[str, ...]) -> None:
+    """With a header the command is the same; a robot that hears nothing is refused."""
+    robots = [DifferentialDrive(twist="Twist" in types, twist_stamped="TwistStamped" in types) for _ in range(2)]
+    assert types_heard(robots[0].hears()) == {"/cmd_vel": tuple(f"geometry_msgs/msg/{name}" for name in types)}
+    for robot, message in zip(robots, (twist(0.5, 0.1), {"header": {}, "twist": twist(0.5, 0.1)}), strict=True):
+        robot.on_message(at(0.0), "/cmd_vel", message)
+        robot.advance(at(1.0))
+    assert (robots[0].x, robots[0].y) == (robots[1].x, robots[1].y) != (0.0, 0.0)
+    with pytest.raises(ValueError, match="expected `twist` or `twist_stamped`, found neither"):
+        DifferentialDrive(twist=False)
 
 
 def test_a_turtle_is_moved_by_its_services() -> None:

@@ -21,6 +21,7 @@ from grader.grading.judging.diagnosis import (
     scopes,
     services,
     silence,
+    simulated,
     values,
 )
 from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, in_order, unfit
@@ -37,6 +38,7 @@ from grader.runtime.model.trace import Fault, Trace, main_not_called, same_node_
 
 #: Modules of rules; each rule says itself where it stands among all.
 _MODULES = (
+    simulated,
     launch_mistakes,
     loading,
     scopes,

@@ -26,6 +26,7 @@ from diagnosis_samples import (
     submission_to,
 )
 from sample_folders import folders_in
+from test_simulated import RULE as SIMULATED
 from tiers import each, more
 
 from grader.grading.judging.diagnosis import CAUSE_KEY, RULES, cases_of, diagnose, rules_of
@@ -169,11 +170,12 @@ def test_a_rule_that_fails_is_logged_and_passed_over(caplog: pytest.LogCaptureFi
 
 
 def test_every_rule_is_shown_to_work() -> None:
-    """By a row of a table, or by a recorded submission, whose hints are compared too."""
+    """By a row of a table, by a recorded submission, whose hints are compared too, or by a test of its own."""
     recorded = [json.loads(one.report)["exercises"] for one in recordings().values()]
     verdicts = [verdict for exercises in recorded for exercise in exercises for verdict in exercise["criteria"]]
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
     shown |= {cause for _, _, _, cause in LAUNCH_SLIPS}
+    shown |= {SIMULATED.id}
     # it only names another criterion, so that reports do not name it
     shown |= {"follows" for v in verdicts if v.get("same_cause_as") and CAUSE_KEY not in v["evidence"]}
     assert {rule.id for rule in EVERY} - shown == set()
