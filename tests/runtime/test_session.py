@@ -10,7 +10,8 @@ import pytest
 
 from grader.runtime.model.trace import ClockKind, Message, Trace
 from grader.runtime.plan import Plan
-from grader.runtime.session import AUTO, CHARGED_NOTE, DRIFTS, UNCLEAR, VIRTUAL, WALL, RecordingSession
+from grader.runtime.session import AUTO, VIRTUAL, WALL, RecordingSession
+from grader.runtime.supervisor.next_recording import CHARGED_NOTE, DRIFTS, UNCLEAR
 from grader.runtime.supervisor.real_time_budget import RealTimeBudget
 from grader.runtime.supervisor.supervisor import Job
 

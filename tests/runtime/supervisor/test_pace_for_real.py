@@ -10,7 +10,8 @@ import pytest
 from tiers import NIGHTLY, but
 
 from grader.runtime.model.trace import ClockKind, Trace
-from grader.runtime.session import AUTO, CHARGED_NOTE, DRIFTS, VIRTUAL, RecordingSession
+from grader.runtime.session import AUTO, VIRTUAL, RecordingSession
+from grader.runtime.supervisor.next_recording import CHARGED_NOTE, DRIFTS
 
 pytest.importorskip("rclpy")
 

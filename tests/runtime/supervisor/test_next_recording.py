@@ -1,0 +1,89 @@
+"""What is recorded next of a scenario: the table, a row a test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.trace import ClockKind, Message, Trace
+from grader.runtime.supervisor.next_recording import (
+    AUTO,
+    CHARGED_NOTE,
+    COUNTED,
+    DRIFTS,
+    SURELY_COUNTED,
+    UNCLEAR,
+    VIRTUAL,
+    WALL,
+    Wanted,
+    next_recording,
+)
+
+FIRST, ON_WALL = Wanted(may_stop=True), Wanted(WALL)
+
+
+def recorded(clock: ClockKind = ClockKind.VIRTUAL, period_ms: int = 50) -> Trace:
+    messages = tuple(Message(t * 10**6, "/x", "T", {}, b"") for t in range(0, 3000, period_ms))
+    return Trace("alone", clock, 3 * NS_PER_S, messages)
+
+
+GOOD = recorded()
+UNFIT = replace(GOOD, clock_reason="it waits")
+OUR_FAULT = replace(UNFIT, harness_problem="lost")
+#: The host failed, so that virtual time is unsuitable: on the wall clock little of it runs.
+HOST_FAILED = replace(UNFIT, harness_problem="it waits")
+DOUBTFUL = replace(GOOD, may_drift=True)
+AS_FAST, SLOWER = recorded(), recorded(period_ms=60)
+IDLE = recorded(ClockKind.WALL, 75)
+BUSY = replace(IDLE, most_starved_ns=NS_PER_S)
+FAILED = replace(GOOD, observations=(), harness_problem="no worker")
+PLAIN, COUNT, SURE, REAL = (FIRST, DOUBTFUL), (COUNTED, SLOWER), (SURELY_COUNTED, SLOWER), (ON_WALL, BUSY)
+
+
+@pytest.mark.parametrize(
+    ("made", "wanted"),
+    [
+        ([], FIRST),
+        ([(FIRST, GOOD)], GOOD),
+        ([(FIRST, OUR_FAULT)], OUR_FAULT),
+        ([(FIRST, UNFIT)], ON_WALL),
+        ([(FIRST, HOST_FAILED)], ON_WALL),
+        ([(FIRST, UNFIT), (ON_WALL, IDLE)], replace(IDLE, clock_reason="it waits")),
+        ([(FIRST, UNFIT), (ON_WALL, BUSY)], replace(BUSY, clock_reason="it waits")),
+        ([PLAIN], COUNTED),
+        ([PLAIN, (COUNTED, AS_FAST)], DOUBTFUL),
+        ([PLAIN, COUNT], ON_WALL),
+        ([PLAIN, COUNT, (ON_WALL, IDLE)], replace(IDLE, clock_reason=DRIFTS)),
+        ([PLAIN, COUNT, REAL], SURELY_COUNTED),
+        ([PLAIN, COUNT, REAL, SURE], replace(SLOWER, notes=(CHARGED_NOTE,))),
+        ([PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST)], COUNTED),
+        ([PLAIN, COUNT, REAL, (SURELY_COUNTED, FAILED)], COUNTED),
+        ([PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST), (COUNTED, AS_FAST)], replace(AS_FAST, notes=(CHARGED_NOTE,))),
+        ([PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST), (COUNTED, FAILED)], replace(BUSY, clock_reason=DRIFTS)),
+        (
+            [PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST), COUNT, COUNT],
+            replace(BUSY, clock_reason=DRIFTS, harness_problem=UNCLEAR),
+        ),
+        # virtual time does not suit the nodes, and their work may slow them down as well
+        ([(FIRST, replace(UNFIT, may_drift=True)), REAL], COUNTED),
+    ],
+)
+def test_what_was_recorded_says_what_is_next(made: list[tuple[Wanted, Trace]], wanted: Wanted | Trace) -> None:
+    """In the order in which a scenario goes through the table."""
+    assert next_recording(made, AUTO) == wanted
+
+
+@pytest.mark.parametrize("clock", [VIRTUAL, WALL])
+def test_a_clock_that_was_asked_for_is_recorded_once(clock: str) -> None:
+    """Whatever the recording says of it."""
+    first = next_recording([], clock)
+    assert first == Wanted(clock)
+    assert next_recording([(first, UNFIT)], clock) == UNFIT
+
+
+@pytest.mark.parametrize(("made", "reason"), [([(FIRST, UNFIT)], "it waits"), ([PLAIN, COUNT], DRIFTS)])
+def test_without_the_wall_clock_its_reason_is_told(made: list[tuple[Wanted, Trace]], reason: str) -> None:
+    """With what was recorded in virtual time."""
+    assert next_recording(made, AUTO, on_wall=False) == replace(made[0][1], clock_reason=reason)
