@@ -22,7 +22,7 @@ from grader.grading.app.grade import prepared
 from grader.grading.app.request import request_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
-from grader.runtime.recording.codec import beside_trace, from_json, trace_to_json
+from grader.runtime.recording.codec import from_json, trace_to_json
 from grader.runtime.session import AUTO, RecordingSession, open_session
 
 #: As the command line does: imports make many objects and no garbage.
@@ -105,7 +105,7 @@ def _recorded(session: RecordingSession, recordings: Recordings, number: int) ->
                     "number": number,
                     "exercise": exercise,
                     "scenario": scenario,
-                    "trace": {**trace_to_json(trace), **beside_trace(trace)},
+                    "trace": trace_to_json(trace, aside=True),
                 }
                 for (exercise, scenario), trace in traces.items()
             ]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields, is_dataclass
 from enum import Enum
 from functools import lru_cache
@@ -35,6 +35,9 @@ from grader.runtime.model.trace import (
 from grader.runtime.stimuli import PLANNED
 
 FORMAT = "grader/trace/v1"
+#: The fields of a trace that are always written, and those that evidence does not include.
+HEAD = ("scenario", "clock", "clock_reason", "stop_ns", "notes", "harness_problem")
+ASIDE = frozenset({"reached", "incomplete", "may_drift"})
 #: The tag of each kind of observation.
 TAGS: Mapping[type, str] = {
     Message: "message",
@@ -59,35 +62,25 @@ _QOS, _USUAL_QOS = 2, ["reliable", "volatile"]
 _ENDPOINTS = 3
 
 
-def trace_to_json(trace: Trace) -> dict[str, Any]:
-    """Convert a trace to plain JSON values; NaN and infinities become `{"float": "nan"}`."""
-    return {
-        "format": FORMAT,
-        "scenario": trace.scenario,
-        "clock": trace.clock.value,
-        "clock_reason": trace.clock_reason,
-        "stop_ns": trace.stop_ns,
-        "notes": list(trace.notes),
-        "harness_problem": trace.harness_problem,
-        **({"starts": [_start_to_json(start) for start in trace.starts]} if trace.starts else {}),
-        **({"suspected": True} if trace.suspected else {}),
-        **({"most_starved_ns": trace.most_starved_ns} if trace.most_starved_ns else {}),
-        **({"all_starved_ns": trace.all_starved_ns} if trace.all_starved_ns else {}),
-        **({"unchecked": trace.unchecked} if trace.unchecked else {}),
-        **({"left_out": list(trace.left_out)} if trace.left_out else {}),
-        **({"unstarted": [list(one) for one in trace.unstarted]} if trace.unstarted else {}),
-        **({"written": [plain(file) for file in trace.written]} if trace.written else {}),
-        **({"other_numpy": plain(trace.other_numpy)} if trace.other_numpy is not None else {}),
-        **({"newer": [plain(one) for one in trace.newer]} if trace.newer else {}),
-        **({"author_mistake": asdict(trace.author_mistake)} if trace.author_mistake is not None else {}),
-        **({"tested": _tested_to_json(trace.tested)} if trace.tested is not None else {}),
-        "observations": [observation_to_json(o) for o in trace.observations],
-    }
+def trace_to_json(trace: Trace, *, aside: bool = False) -> dict[str, Any]:
+    """Convert a trace to plain JSON values; NaN and infinities become `{"float": "nan"}`.
+
+    A field of a trace is written if it is not as usual. With `aside`, what evidence does not include is written too: a
+    supervisor has to know it.
+    """
+    data: dict[str, Any] = {"format": FORMAT}
+    for name, usual in _fields_of_trace():
+        value = getattr(trace, name)
+        if name in HEAD or (value != usual and (aside or name not in ASIDE)):
+            data[name] = _WRITERS.get(name, plain)(value)
+    return {**data, "observations": [observation_to_json(o) for o in trace.observations]}
 
 
-def beside_trace(trace: Trace) -> dict[str, Any]:
-    """Convert what the format of evidence does not include, and a supervisor has to know."""
-    return {"reached": list(trace.reached), "incomplete": trace.incomplete, "may_drift": trace.may_drift}
+@lru_cache(maxsize=1)
+def _fields_of_trace() -> tuple[tuple[str, Any], ...]:
+    """Return the fields of a trace but its observations, with their usual values; those of `HEAD` come first."""
+    usual = {field.name: field.default for field in fields(Trace) if field.init and field.name != "observations"}
+    return tuple({**{name: usual[name] for name in HEAD}, **usual}.items())
 
 
 def _tested_to_json(tested: Tested) -> dict[str, Any]:
@@ -119,6 +112,14 @@ def observation_to_json(observation: Observation) -> list[Any]:
 def without_last(row: list[Any], usual: Any) -> list[Any]:
     """Leave out the last field if it has the value that readers take for a missing one."""
     return row[:-1] if row[-1] == usual else row
+
+
+#: How fields of a trace are written that `plain` would write in another way.
+_WRITERS: Mapping[str, Callable[[Any], Any]] = {
+    "starts": lambda starts: [_start_to_json(start) for start in starts],
+    "author_mistake": asdict,
+    "tested": _tested_to_json,
+}
 
 
 def plain(value: Any) -> Any:  # noqa: PLR0911 - one for each kind of value

@@ -8,14 +8,12 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
-from typing import Any, TypeAlias, Union, get_type_hints
+from typing import Any, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.errors import EvidenceError, HarnessError
 from grader.runtime.model.trace import (
-    ClockKind,
     Delivery,
     Endpoint,
     Fault,
@@ -36,7 +34,7 @@ from grader.runtime.model.trace import (
     Trace,
     WrittenFile,
 )
-from grader.runtime.recording.codec import FORMAT, TAGS, trace_to_json
+from grader.runtime.recording.codec import FORMAT, HEAD, TAGS, trace_to_json
 
 #: Shorter values take less memory as dicts; a longer one may contain a number that no decoder accepts.
 _SHORTEST, _LONGEST = 64, 4_000
@@ -143,7 +141,6 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
 _START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, str], ("", "")))
 
 
-_WRITTEN, _NEWER, _OTHER_NUMPY = _row_of(WrittenFile), _row_of(NewerPython), _row_of(OtherNumpy)
 #: The end of a service; its QoS follows in a list, if it is not the usual one.
 _SERVICE_END = _row_of(ServiceEnd, "reliability", "durability", last=("qos", tuple[str, str], ("reliable", "volatile")))
 
@@ -155,57 +152,39 @@ def _start(row: Any) -> Start:
 
 def _trace_row(rows: Iterable[Any]) -> Any:
     """Create the struct that validates the output of `trace_to_json`, with these structs for observations."""
-    written: list[Any] = [
-        *((name, str) for name in ("format", "scenario", "clock_reason", "harness_problem")),
-        ("clock", ClockKind),
-        ("stop_ns", int),
-        ("notes", tuple[str, ...]),
-        ("observations", list[Union[tuple(rows)]]),  # type: ignore[misc]  # noqa: UP007
-        ("starts", tuple[_START, ...], ()),  # type: ignore[valid-type]
-        ("reached", tuple[str, ...], ()),
-        ("incomplete", bool, False),
-        ("may_drift", bool, False),
-        ("suspected", bool, False),
-        ("most_starved_ns", int, 0),
-        ("all_starved_ns", int, 0),
-        ("unchecked", str, ""),
-        ("left_out", tuple[str, ...], ()),
-        ("unstarted", tuple[tuple[str, str], ...], ()),
-        ("written", tuple[_WRITTEN, ...], ()),  # type: ignore[valid-type]
-        ("newer", tuple[_NEWER, ...], ()),  # type: ignore[valid-type]
-        ("other_numpy", _OTHER_NUMPY | None, None),
-        ("author_mistake", AuthorMistake | None, None),
-        ("tested", _TESTED | None, None),
-    ]
+    observations: Any = list[Union[tuple(rows)]]  # type: ignore[misc]  # noqa: UP007
+    written: list[Any] = [("format", str), ("observations", observations)]
+    written += [(name, _written_as(hint)) for name, hint in _HINTS.items() if name in HEAD]
+    usual = {field.name: field.default for field in fields(Trace)}
+    written += [(name, _written_as(hint), usual[name]) for name, hint in _HINTS.items() if name not in HEAD]
     return msgspec.defstruct("Trace", written)
 
 
 def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> Trace:
     """Build a trace from a struct, with these functions for observations."""
-    return Trace(
-        scenario=row.scenario,
-        clock=row.clock,
-        stop_ns=row.stop_ns,
-        observations=tuple([makers[type(one)](one) for one in row.observations]),
-        clock_reason=row.clock_reason,
-        notes=row.notes,
-        harness_problem=row.harness_problem,
-        starts=tuple(map(_start, row.starts)),
-        reached=row.reached,
-        incomplete=row.incomplete,
-        may_drift=row.may_drift,
-        suspected=row.suspected,
-        most_starved_ns=row.most_starved_ns,
-        all_starved_ns=row.all_starved_ns,
-        unchecked=row.unchecked,
-        left_out=row.left_out,
-        unstarted=row.unstarted,
-        written=tuple(_same(WrittenFile, file) for file in row.written),
-        newer=tuple(_same(NewerPython, one) for one in row.newer),
-        other_numpy=None if row.other_numpy is None else _same(OtherNumpy, row.other_numpy),
-        author_mistake=row.author_mistake,
-        tested=None if row.tested is None else _tested(row.tested),
-    )
+    values = {name: _made(hint, getattr(row, name)) for name, hint in _HINTS.items()}
+    return Trace(observations=tuple([makers[type(one)](one) for one in row.observations]), **values)
+
+
+def _part_of(hint: Any) -> Any:
+    """Return the one of `_PARTS` in the type of a field; None if there is none."""
+    return next((one for one in (hint, *get_args(hint)) if one in _PARTS), None)
+
+
+def _written_as(hint: Any) -> Any:
+    """Return the type that a field of a trace is written as."""
+    if (part := _part_of(hint)) is None:
+        return hint
+    row: Any = _PARTS[part][0]
+    return tuple[row, ...] if get_origin(hint) is tuple else row | None
+
+
+def _made(hint: Any, value: Any) -> Any:
+    """Return the value of a field of a trace from what was written."""
+    if (part := _part_of(hint)) is None or value is None:
+        return value
+    make = _PARTS[part][1]
+    return tuple(map(make, value)) if get_origin(hint) is tuple else make(value)
 
 
 def trace_from_json(data: Any) -> Trace:
@@ -311,6 +290,18 @@ def _tested(row: Any) -> Tested:
     return Tested(row.passed, row.reason, row.hint, fault, row.missing)
 
 
+#: What fields of a trace hold besides plain values: the struct that validates it, and what makes it from that.
+_PARTS: Mapping[Any, tuple[Any, Callable[[Any], Any]]] = {
+    Start: (_START, _start),
+    Tested: (_TESTED, _tested),
+    **{kind: (_row_of(kind), partial(_same, kind)) for kind in (WrittenFile, NewerPython, OtherNumpy)},
+}
+#: The types of the fields of a trace but its observations: memory, the wire and evidence follow from them.
+_HINTS: Mapping[str, Any] = {
+    field.name: get_type_hints(Trace)[field.name]
+    for field in fields(Trace)
+    if field.init and field.name != "observations"
+}
 _TRACE = _trace_row(_EXACT_ROWS.values())
 _OBSERVATIONS = list[Union[tuple(_EXACT_ROWS.values())]]  # type: ignore[misc, valid-type]  # noqa: UP007
 #: The fast variant keeps the fields of messages as JSON text.

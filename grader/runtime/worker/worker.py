@@ -31,7 +31,7 @@ from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import ClockKind, Delivery, FaultKind, Mark, Message, Observation, Trace
 from grader.runtime.patience import load_per_processor
 from grader.runtime.plan import Plan
-from grader.runtime.recording.codec import beside_trace, from_json, observation_to_json, trace_to_json
+from grader.runtime.recording.codec import from_json, observation_to_json, trace_to_json
 from grader.runtime.ros_installation import MESSAGE_PACKAGES, PythonRuntime
 from grader.runtime.sandbox.environment import quick_discovery
 from grader.runtime.sandbox.protocol import Isolation, StudentProcess
@@ -610,7 +610,7 @@ def written(answer: Mapping[str, Any]) -> Iterator[str]:
     if trace is None:
         yield json.dumps(answer) + "\n"
         return
-    head = {**trace_to_json(replace(trace, observations=())), **beside_trace(trace)}
+    head = trace_to_json(replace(trace, observations=()), aside=True)
     del head["observations"]
     yield json.dumps({name: value for name, value in answer.items() if name != "trace"})[:-1]
     yield f', "trace": {json.dumps(head)[:-1]}, "observations": ['
