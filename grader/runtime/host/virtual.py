@@ -238,9 +238,9 @@ class VirtualTime:
             self._charging.remove(thread)
 
     def depart(self) -> None:
-        """Do what `leave` does before the process may end at once, and tell the time if it has moved on its own."""
+        """Do what `leave` does before the process may end at once, and tell what has changed: time, and endpoints."""
         self.leave()
-        if self._ledger is not None and self._moved:
+        if self._ledger is not None and (self._moved or self._ledger.changed):
             self._settle()
 
     def _settle(self) -> None:
@@ -293,6 +293,8 @@ class VirtualTime:
         answer = self._answered(report)
         self.resumed_ns = self._real.processor_ns()
         self.running = True
+        if self._ledger is not None and self._ledger.is_timed:
+            self.give_up_outside("timed_event")
         if leaving and self._ledger is not None:
             self._ledger.settled()
         if answer.get("stop"):
@@ -320,7 +322,7 @@ class VirtualTime:
             if "match" in answer:
                 missing = self._ledger.await_matches(answer["match"], answer["wait_s"])
                 self._ledger.await_absence(answer.get("gone", []), answer["wait_s"])
-                untold = self._ledger.await_events(answer["match"].get("refused", {}), answer["wait_s"])
+                untold = self._ledger.await_events(answer["match"], answer["wait_s"])
                 answer = self._link.ask({"kind": "matched", "missing": missing, "untold": untold})
             elif "expect" in answer:
                 self._ledger.expect(answer["expect"])

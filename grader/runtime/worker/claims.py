@@ -48,6 +48,11 @@ def readers_of(claims: Iterable[dict[str, Any]], topic: str) -> list[dict[str, A
     return [c for c in claims if c["kind"] == "subscription" and c["name"] == topic]
 
 
+def ends_of_kind(claims: Iterable[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
+    """Return the endpoints of a kind."""
+    return [c for c in claims if c["kind"] == kind]
+
+
 def ends_of(claims: Iterable[dict[str, Any]], kind: str, name: str) -> list[dict[str, Any]]:
     """Return the endpoints of a kind and name; every node has some services."""
     # The services of parameters and of types come with a node, and hosts do not report them one by one.
