@@ -257,7 +257,10 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     now = Clock.now
 
     def looked_at(self: Clock) -> Time:
-        shown_ns = clock.look()
+        module = str(sys._getframe(1).f_globals.get("__name__"))
+        # rclpy stamps its own messages. What a sleep of it is counted from, a program that looks may compare with.
+        own = module.startswith("rclpy.")
+        shown_ns = clock.look(paces=not own, shown=not own or (module == "rclpy.clock" and clock.was_looked_at))
         if not clocks.follows(self):
             return now(self)
         with self.handle:  # raises if it was destroyed
