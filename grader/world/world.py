@@ -218,6 +218,7 @@ class World:
         self._fits = True  # whether nothing has changed since it was looked at whether types and QoS fit
         self._mismatches: set[str] = set()
         self.left_out: list[str] = []
+        self._given: list[telling.Given] = []
         self._goals = 0
         self._random: Random | None = None
         self._starting = self._judging = False
@@ -270,7 +271,10 @@ class World:
             ),
         )
         self._programs[label] = started = Program(label, found.root, self._signal, self._catch_up)
+        before = {*self._graph.nodes}
         self._perform(StartProcesses(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
+        nodes = frozenset({*self._graph.nodes} - before)
+        self._given.append(telling.Given(started, tuple(parameters or ()), dict(remappings or {}), nodes))
         return started
 
     @_with_hint
@@ -804,6 +808,11 @@ class World:
     def is_drawn(self) -> bool:
         """Whether anything in this run was drawn from its seed."""
         return self._plan.drawn_order or bool(self._plan.connections)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Sentences about what the test has asked for in vain: parts of launch files, parameters and remappings."""
+        return [*self.left_out, *(text for one in self._given for text in telling.in_vain(one, self._observations))]
 
     @property
     def problem(self) -> str:
