@@ -29,6 +29,7 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, size
 from grader.runtime.model.trace import Endpoint, GraphSnapshot
 from grader.runtime.padding import without_padding
+from grader.runtime.worker import farewell
 from grader.runtime.worker.claims import BACKGROUND_TYPES
 from grader.runtime.worker.console import TEXT_CHARACTERS, Logged
 from grader.runtime.worker.core import Taken, in_order
@@ -36,10 +37,13 @@ from grader.runtime.worker.ros_names import asked, listed
 from grader.runtime.worker.service_ends import ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
+PARAMETER_EVENTS = "/parameter_events"
+BACKGROUND = frozenset({"/rosout", PARAMETER_EVENTS})
+#: So many bytes at the beginning of an endpoint's GUID are those of its participant.
+PREFIX_BYTES = 12
 #: When a message was sent and when it arrived, as `take_message` names what the middleware says. Its threads receive
 #: messages whatever the grader itself is busy with.
 TIMESTAMPS = ("source_timestamp", "received_timestamp")
-BACKGROUND = frozenset({"/rosout", "/parameter_events"})
 #: Queue depth, enough for everything that can be published between two polls.
 DEPTH = 5000
 #: The most messages of a topic, and bytes of all topics, that one poll takes; the rest is left for the next poll.
@@ -150,9 +154,8 @@ class Observer:
 
     def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
         own = info.node_name in self._names
-        # The first twelve bytes of an endpoint's GUID are those of its participant, and a process has one for each ROS
-        # context.
-        prefix = bytes(info.endpoint_gid[:12])
+        # A process has a participant for each ROS context.
+        prefix = bytes(info.endpoint_gid[:PREFIX_BYTES])
         number = -1 if own else self._participants.setdefault(prefix, len(self._participants))
         manual = info.qos_profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
         reliability, durability = _qos_words(info.qos_profile)
@@ -168,6 +171,23 @@ class Observer:
             liveliness="manual_by_topic" if manual else "automatic",
             lease_ns=_finite_ns(info.qos_profile.liveliness_lease_duration),
         )
+
+    def participants_of_nodes(self) -> dict[bytes, set[str]]:
+        """Return the full names of the students' nodes of each participant, whether they have endpoints or not.
+
+        Every node publishes the changes of its parameters.
+        """
+        found: dict[bytes, set[str]] = {}
+        nobody: list[Any] = []
+        for info in asked(self.node.get_publishers_info_by_topic, PARAMETER_EVENTS, nothing=nobody):
+            if info.node_name not in self._names:
+                node = _full_name(info.node_name, info.node_namespace)
+                found.setdefault(bytes(info.endpoint_gid[:PREFIX_BYTES]), set()).add(node)
+        return found
+
+    def say_farewell(self, participants: Iterable[bytes]) -> None:
+        """Tell everybody in the domain that some participants have left, by the beginning of their GUIDs."""
+        farewell.say_for(participants, self._domain)
 
     def watch(self, endpoints: Iterable[Endpoint]) -> list[str]:
         """Subscribe to every topic that has a publisher; return the topics whose type is not installed.

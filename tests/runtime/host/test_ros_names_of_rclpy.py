@@ -77,6 +77,7 @@ CPP = {
             "rclpy_get_service_names_and_types",
             "rclpy_get_publishers_info_by_topic",
             "rclpy_get_subscriptions_info_by_topic",
+            "rmw_liveliness_changed_status_t",
         ),
         *(
             "rclpy_get_topic_names_and_types",
