@@ -95,6 +95,7 @@ CPP = {
     "Node": (
         *("get_action_client_names_and_types_by_node", "get_action_names_and_types"),
         *("get_action_server_names_and_types_by_node", "get_count_clients"),
+        *("get_node_names_and_namespaces", "get_node_names_and_namespaces_with_enclaves"),
     ),
     "Publisher": ("get_subscription_count", "get_topic_name"),
     "Subscription": ("get_publisher_count", "get_topic_name", "pointer", "take_message"),
