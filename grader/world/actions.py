@@ -17,7 +17,7 @@ from grader.runtime.simulation import Moment
 from grader.world.errors import GoalAborted, GoalCanceled, GoalRejected
 
 
-class Status(IntEnum):
+class GoalState(IntEnum):
     """What has become of a goal, as in action_msgs/msg/GoalStatus; it is executed as soon as it is accepted."""
 
     UNKNOWN = 0
@@ -55,7 +55,7 @@ class _Goal:
     uuid: tuple[int, ...]
     stamp_ns: int
     steps: Steps
-    status: Status = Status.EXECUTING
+    status: GoalState = GoalState.EXECUTING
     wake_ns: int | None = None
     result: Mapping[str, Any] = field(default_factory=dict)
     asked: list[int] = field(default_factory=list)
@@ -142,11 +142,13 @@ class ServedAction:
                 self._publish("feedback", message)
                 step = next(goal.steps)
         except StopIteration as end:
-            self._end(goal, Status.CANCELED if goal.status is Status.CANCELING else Status.SUCCEEDED, end.value)
+            self._end(
+                goal, GoalState.CANCELED if goal.status is GoalState.CANCELING else GoalState.SUCCEEDED, end.value
+            )
         except GoalCanceled as end:
-            self._end(goal, Status.CANCELED, end.result)
+            self._end(goal, GoalState.CANCELED, end.result)
         except GoalAborted as end:
-            self._end(goal, Status.ABORTED, end.result)
+            self._end(goal, GoalState.ABORTED, end.result)
         else:
             if not isinstance(step, (int, float)) or isinstance(step, bool) or step < 0:
                 raise TypeError(f"{self.name}: expected seconds, or a {self.type} feedback, as a step, found {step!r}")
@@ -154,7 +156,7 @@ class ServedAction:
             if goal.wake_ns == now.t_ns:
                 self._go_on(goal, now, lambda: next(goal.steps))
 
-    def _end(self, goal: _Goal, status: Status, result: Any) -> None:
+    def _end(self, goal: _Goal, status: GoalState, result: Any) -> None:
         result = self._kind.Result() if result is None else result
         if not isinstance(result, self._kind.Result):
             found = type(result).__name__
@@ -168,7 +170,7 @@ class ServedAction:
     def _ask_for_result(self, number: int, uuid: tuple[int, ...]) -> None:
         goal = self._goals.get(uuid)
         if goal is None:
-            self._does.append(("get_result", number, {"status": int(Status.UNKNOWN)}))
+            self._does.append(("get_result", number, {"status": int(GoalState.UNKNOWN)}))
         elif goal.wake_ns is None:
             self._does.append(("get_result", number, {"status": int(goal.status), "result": goal.result}))
         else:
@@ -189,7 +191,7 @@ class ServedAction:
         infos = [_info(one) for one in going]
         self._does.append(("cancel_goal", number, {"return_code": code, "goals_canceling": infos}))
         for goal in going:
-            goal.status = Status.CANCELING
+            goal.status = GoalState.CANCELING
         if going:
             self._tell_status()
         for goal in going:

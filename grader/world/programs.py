@@ -285,7 +285,10 @@ class Program:
         self._signal(self, "interrupt")
 
     def kill(self) -> None:
-        """End it at once; its nodes vanish without a farewell."""
+        """End it at once, as SIGKILL does.
+
+        Its nodes say no farewell: others see them until their lease ends, after 20 s.
+        """
         __tracebackhide__ = True
         self._signal(self, "kill")
 

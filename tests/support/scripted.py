@@ -263,6 +263,11 @@ class ScriptedObserver:
             for process, claims in self._world.claims.items()
         }
 
+    def has_namesakes(self) -> bool:
+        """Return whether nodes of one name are claimed."""
+        names = self.students_nodes()
+        return len({*names}) < len(names)
+
     def say_farewell(self, participants: Iterable[bytes]) -> None:
         """Let processes leave."""
         for participant in participants:

@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 import weakref
+from collections import Counter
 from collections.abc import Callable, Iterator
 from types import CodeType, FrameType, SimpleNamespace
 from typing import Any
@@ -1039,6 +1040,25 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     for owner, names in ((rclpy.node.Node, GRAPH_LOOKS), (_rclpy.Node, ACTION_LOOKS)):
         for name in names:
             looking(owner, name, lambda: at_the_graph(whole=True))
+    for name in ("get_node_names_and_namespaces", "get_node_names_and_namespaces_with_enclaves"):
+        _leave_out_gone_nodes(name)
+
+
+def _leave_out_gone_nodes(name: str) -> None:
+    """Let a method that lists nodes leave out those that have gone.
+
+    rmw_fastrtps learns of a participant's nodes and of its end on two threads. If the end comes first, the nodes return
+    for good. Each node that exists publishes the changes of its parameters.
+    """
+    listed = getattr(_rclpy.Node, name)
+
+    @functools.wraps(listed)
+    def existing(self: Any) -> Any:
+        publishers = _rclpy.rclpy_get_publishers_info_by_topic(self, "/parameter_events", False)  # noqa: FBT003 - C++
+        left = Counter((one["node_name"], one["node_namespace"]) for one in publishers)
+        return [found for found in listed(self) if left[found[:2]] > 0 and not left.subtract([found[:2]])]
+
+    setattr(_rclpy.Node, name, existing)
 
 
 def _note_ended_tasks(clock: VirtualClock) -> None:

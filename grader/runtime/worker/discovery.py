@@ -145,7 +145,15 @@ class Discovery:
             self.tell_all()
             return
         self._core.remains.remove(remains)
-        self._observer.say_farewell([p for p, name in self._owners.items() if name == remains.name])
+        claims = self.matching.claims()
+
+        def has_left() -> bool:
+            # again, if it is still there: what it had sent before its end may have arrived only now
+            self._observer.say_farewell([p for p, name in self._owners.items() if name == remains.name])
+            self._query(now_ns)
+            return not self._surplus(claims)
+
+        self._departures.wait(has_left, pause_s=GRAPH_PAUSE_S)
         self.match(now_ns)
 
     def _staying(self) -> list[NodeProcess]:
@@ -194,10 +202,10 @@ class Discovery:
         # The end of an action outlives its node, and is then in the list of none.
         nodes = [s.claims for s in self._staying() if any(c.kind == "node" for c in s.claims)]
         exchanging = {(c.kind, c.name, c.type) for own in nodes for c in own if c.kind in ("service", "client")}
-        # The middleware tells the services of one node of a name. A node lives on until it is collected, and a process
-        # that left may stay in the graph for its lease.
-        namesakes = any(kind == "node" and count > 1 for (kind, _, _), count in found.items())
-        return (namesakes or exchanging <= offered) and all(found[key] >= count for key, count in wanted.items())
+        # The middleware tells the services of one node of a name. A node lives on until it is collected, a process that
+        # died stays in the graph for its lease, and one that left may return.
+        told = exchanging <= offered or self._observer.has_namesakes()
+        return told and all(found[key] >= count for key, count in wanted.items())
 
     def _surplus(self, claims: list[Claim]) -> Counter[Key]:
         """Count the removed endpoints that are still in the graph, except known strangers."""

@@ -15,6 +15,8 @@ from collections.abc import Iterable
 #: The ports at which participants hear of each other (RTPS 2.3, 9.6.1.1): the first one of a domain, the distance to
 #: the next domain's, the first one of a participant, and the distance to the next participant's.
 PORT, OF_DOMAIN, OF_PARTICIPANTS, OF_PARTICIPANT = 7400, 250, 10, 2
+#: The address at which all participants of a domain hear, at its first port (9.6.1.4.1).
+GROUP = "239.255.0.1"
 #: How many participants of a domain have ports of their own before those of the next domain begin.
 PARTICIPANTS = (OF_DOMAIN - OF_PARTICIPANTS) // OF_PARTICIPANT
 #: The beginning of a message: protocol, version 2.3, and eProsima as vendor.
@@ -37,13 +39,16 @@ def say_for(participants: Iterable[bytes], domain: int) -> None:
         participants: The first twelve bytes of the GUIDs of each that has left.
         domain: The ROS domain.
     """
-    first = PORT + OF_DOMAIN * domain + OF_PARTICIPANTS
+    first = PORT + OF_DOMAIN * domain
+    own = [("127.0.0.1", first + OF_PARTICIPANTS + OF_PARTICIPANT * number) for number in range(PARTICIPANTS)]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
         for prefix in participants:
             message = farewell(prefix)
-            for number in range(PARTICIPANTS):
+            # To the group as well: what the participant has announced there is read before it, however late.
+            for address in ((GROUP, first), *own):
                 with contextlib.suppress(OSError):  # nobody listens there, or not any more
-                    out.sendto(message, ("127.0.0.1", first + OF_PARTICIPANT * number))
+                    out.sendto(message, address)
 
 
 def farewell(prefix: bytes) -> bytes:

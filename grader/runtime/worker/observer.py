@@ -178,8 +178,7 @@ class Observer:
         Every node publishes the changes of its parameters.
         """
         found: dict[bytes, set[str]] = {}
-        nobody: list[Any] = []
-        for info in asked(self.node.get_publishers_info_by_topic, PARAMETER_EVENTS, nothing=nobody):
+        for info in self._publishing():
             if info.node_name not in self._names:
                 node = _full_name(info.node_name, info.node_namespace)
                 found.setdefault(bytes(info.endpoint_gid[:PREFIX_BYTES]), set()).add(node)
@@ -250,10 +249,27 @@ class Observer:
     def _names_in_graph(self, existing: Collection[str] | None) -> list[tuple[str, str]]:
         known: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
         pairs = [p for p in known if p[0] not in {*self._names, UNKNOWN_NODE}]
-        return [p for p in pairs if existing is None or _full_name(*p) in existing or self._publishes_anything(*p)]
+        return pairs if existing is None else self._without_gone(pairs, existing)
 
-    def _publishes_anything(self, name: str, namespace: str) -> bool:
-        return bool(asked(self.node.get_publisher_names_and_types_by_node, name, namespace, nothing=[]))
+    def _without_gone(self, pairs: list[tuple[str, str]], existing: Collection[str] = ()) -> list[tuple[str, str]]:
+        """Return the names of the nodes that exist, of those that rmw_fastrtps lists: as often as they publish."""
+        publishing = Counter((info.node_name, info.node_namespace) for info in self._publishing())
+        return [
+            pair
+            for pair, count in Counter(pairs).items()
+            for _ in range(min(count, max(publishing[pair], int(_full_name(*pair) in existing))))
+        ]
+
+    def _publishing(self) -> list[Any]:
+        """Return the publishers of changes of parameters: each node has one."""
+        nobody: list[Any] = []
+        found: list[Any] = asked(self.node.get_publishers_info_by_topic, PARAMETER_EVENTS, nothing=nobody)
+        return found
+
+    def has_namesakes(self) -> bool:
+        """Return whether nodes of one name are listed, of which one may have gone: of one, the others hide the rest."""
+        names: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
+        return len({*names}) < len(names)
 
     def ends_of(self, kind: str, service: str) -> int:
         """Return the number of servers (`service`) or clients (`client`) of a service, including the grader's own."""
@@ -261,9 +277,13 @@ class Observer:
         return int(asked(count, service, nothing=0))
 
     def counts(self) -> dict[str, int]:
-        """Count the endpoints and nodes in the graph by name, as any node sees them, including the grader's own."""
+        """Count the endpoints and nodes in the graph by name, as any node sees them, including the grader's own.
+
+        Nodes that have gone are left out, as the host leaves them out for programs: see `students_nodes`.
+        """
         node = self.node
-        nodes: list[tuple[str, str]] = listed(node.get_node_names_and_namespaces)
+        known: list[tuple[str, str]] = listed(node.get_node_names_and_namespaces)
+        nodes = self._without_gone(known)
         topics: list[tuple[str, list[str]]] = listed(node.get_topic_names_and_types)
         services: list[tuple[str, list[str]]] = listed(node.get_service_names_and_types)
         found = Counter(f"node {_full_name(*pair)}" for pair in nodes)
