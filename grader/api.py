@@ -233,6 +233,13 @@ if TYPE_CHECKING:
     from grader.testing import builtin_check as builtin_check
     from grader.testing import explain as explain
     from grader.testing import judge as judge
+    from grader.world.asking import GoalHandle as GoalHandle
+    from grader.world.asking import GoalResult as GoalResult
+    from grader.world.asking import PendingCall as PendingCall
+    from grader.world.asking import Received as Received
+    from grader.world.errors import GoalAborted as GoalAborted
+    from grader.world.errors import GoalCanceled as GoalCanceled
+    from grader.world.errors import GoalRejected as GoalRejected
     from grader.world.errors import NoMessage as NoMessage
     from grader.world.errors import ParameterRejected as ParameterRejected
     from grader.world.errors import ProgramFailed as ProgramFailed
@@ -242,9 +249,7 @@ if TYPE_CHECKING:
     from grader.world.opening import open_world as open_world
     from grader.world.programs import Program as Program
     from grader.world.world import Failure as Failure
-    from grader.world.world import GoalResult as GoalResult
     from grader.world.world import Launched as Launched
-    from grader.world.world import Received as Received
     from grader.world.world import World as World
 
 #: The public names by topic and by the module that they are in.
@@ -336,9 +341,12 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Own nodes, step by step": {
         "grader.world.opening": "open_world Worlds",
-        "grader.world.world": "World Received GoalResult Launched Failure",
+        "grader.world.world": "World Launched Failure",
+        "grader.world.asking": "Received PendingCall GoalHandle GoalResult",
         "grader.world.programs": "Program",
-        "grader.world.errors": "ProgramFailed StepTimeout NoMessage ParameterRejected WrongType",
+        "grader.world.errors": (
+            "ProgramFailed StepTimeout NoMessage ParameterRejected WrongType GoalRejected GoalAborted GoalCanceled"
+        ),
     },
     "Tests": {
         "grader.testing": "TraceBuilder judge explain builtin_check",

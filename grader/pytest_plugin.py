@@ -219,7 +219,7 @@ def ros(
         yield world
     if _WORLD not in request.node.stash:
         return  # the test has failed, and everything is told with it
-    for text in world.left_out:
+    for text in world.remarks:
         request.node.warn(pytest.PytestWarning(text))
     if world.problem:
         pytest.fail(world.problem, pytrace=False)
@@ -239,7 +239,7 @@ def pytest_runtest_makereport(
         del item.stash[_WORLD]  # the fixture has nothing to add
         repeating = "repeat it with" if world.repeats else "the same delays and losses are drawn with"
         drawn = [f"seed {world.seed}: {repeating} --ros-seed {world.seed}"] if world.is_drawn else []
-        lines = [*drawn, *world.left_out, *_kept(item, world, call.excinfo)]
+        lines = [*drawn, *world.remarks, *_kept(item, world, call.excinfo)]
         report.sections.append(("ros", "\n".join(lines)))
         item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
     return report

@@ -52,7 +52,12 @@ def serialized(message: Any, where: str) -> tuple[str, bytes]:
         interface = type_name(type(message), "msg")
     except TypeError:
         raise TypeError(f"{where}: expected a ROS message, found {type(message).__name__}") from None
-    return interface, without_padding(bytes(serialize_message(message)), type(message))
+    return interface, bytes_of(message)
+
+
+def bytes_of(message: Any) -> bytes:
+    """Return the bytes of a message, or of a part of a service or action."""
+    return without_padding(bytes(serialize_message(message)), type(message))
 
 
 def type_of_part(value: Any, part: str, where: str) -> tuple[str, Any]:

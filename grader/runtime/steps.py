@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -50,6 +50,7 @@ class Publish:
         type: Type of the messages.
         messages: The serialized messages, in the order of sending; the last one is repeated. Empty to stop a stream.
         period_ns: Time between two messages; 0 to publish once.
+        times_ns: When each is sent, from now on, where they have times of their own; the last one is not repeated then.
         best_effort: Reliability of the publisher.
         latched: Whether it is transient-local.
     """
@@ -58,6 +59,7 @@ class Publish:
     type: str
     messages: tuple[bytes, ...]
     period_ns: int = 0
+    times_ns: tuple[int, ...] = ()
     best_effort: bool = False
     latched: bool = False
 
@@ -67,6 +69,14 @@ class Serve:
     """Offer a service; requests are answered by the supervisor's side."""
 
     service: str
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class ServeAction:
+    """Offer an action; what becomes of its goals, the supervisor's side says."""
+
+    action: str
     type: str
 
 
@@ -124,9 +134,18 @@ class Finish:
     """End the run with all its processes."""
 
 
-Command = StartProcesses | Advance | Publish | Serve | CallService | SendGoal | Simulate | Interrupt | Kill | Finish
+Command = (
+    StartProcesses
+    | Advance
+    | Publish
+    | Serve
+    | ServeAction
+    | CallService
+    | SendGoal
+    | Simulate
+    | Interrupt
+    | Kill
+    | Finish
+)
 #: Each command by its name on the wire.
-COMMANDS: Mapping[str, type] = {
-    kind.__name__: kind
-    for kind in (StartProcesses, Advance, Publish, Serve, CallService, SendGoal, Simulate, Interrupt, Kill, Finish)
-}
+COMMANDS: Mapping[str, type] = {kind.__name__: kind for kind in get_args(Command)}

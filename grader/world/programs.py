@@ -31,6 +31,8 @@ from grader.world.errors import NoMessage
 
 Value = TypeVar("Value")
 
+#: What `ros.run` gives a program: values of parameters by name, or the path of a parameter file.
+Parameters = Mapping[str, Any] | str | os.PathLike[str]
 #: What `ros.run` starts: a path, `PACKAGE/EXECUTABLE`, or the function to call, such as a module's `main`.
 Runnable = str | os.PathLike[str] | Callable[..., Any]
 
@@ -155,6 +157,32 @@ def _runnable(found: Found) -> list[Executable]:
     return [one for one in executables(found.root, found.projects) if one.file is not None]
 
 
+def given_parameters(
+    given: Parameters | Sequence[Parameters] | None, near: Sequence[Path]
+) -> tuple[dict[str, Any], tuple[tuple[str, str], ...]]:
+    """Return what a program is given: values by their names, and name and text of parameter files.
+
+    Values that come beside files become a file as well, because rcl lets those on the command line count least.
+
+    Raises SubmissionError if there is no such file.
+    """
+    several = [given] if isinstance(given, (Mapping, str, os.PathLike)) else [*(given or ())]
+    if all(isinstance(one, Mapping) for one in several):
+        return {name: value for one in several if isinstance(one, Mapping) for name, value in one.items()}, ()
+    files: list[tuple[str, str]] = []
+    for one in several:
+        if isinstance(one, Mapping):
+            lines = [f"    {json.dumps(name)}: {value}" for name, value in parameter_values(one)]
+            files.append(("parameters.yaml", "\n".join(["/**:", "  ros__parameters:", *lines, ""])))
+            continue
+        path = next((found for folder in near if (found := folder / one).is_file()), None)
+        if path is None:
+            where = listed([str(folder) for folder in near])
+            raise SubmissionError(f"{os.fspath(one)}: expected a parameter file, found none", f"looked in {where}")
+        files.append((path.name, path.read_text(encoding="utf-8")))
+    return {}, tuple(files)
+
+
 def parameter_values(parameters: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield parameters with their values in YAML, as they are given on the command line."""
     for name, value in parameters.items():
@@ -257,7 +285,10 @@ class Program:
         self._signal(self, "interrupt")
 
     def kill(self) -> None:
-        """End it at once; its nodes vanish without a farewell."""
+        """End it at once, as SIGKILL does.
+
+        Its nodes say no farewell: others see them until their lease ends, after 20 s.
+        """
         __tracebackhide__ = True
         self._signal(self, "kill")
 

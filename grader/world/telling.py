@@ -18,6 +18,7 @@ from grader.runtime.model.trace import (
     LogRecord,
     Message,
     Observation,
+    Offer,
     OutputLine,
     Request,
     Response,
@@ -32,6 +33,16 @@ from grader.world.programs import Program
 MOST_LINES, LINE_CHARACTERS = 8, 160
 #: Services that every node has, for parameters.
 OF_EVERY_NODE = ("set_parameters", "set_parameters_atomically", "get_parameters", "list_parameters")
+#: Parameters and topics that every node has, which are not observed.
+PARAMETERS_OF_EVERY_NODE = ("use_sim_time", "start_type_description_service")
+NAMES_OF_EVERY_NODE = (
+    "rosout",
+    "parameter_events",
+    "clock",
+    *OF_EVERY_NODE,
+    "describe_parameters",
+    "get_parameter_types",
+)
 _HAPPENED = {
     FaultKind.SYNTAX_ERROR: "could not be compiled",
     FaultKind.EXCEPTION: "raised an exception",
@@ -115,6 +126,60 @@ def _unheard(graph: GraphSnapshot, topics: Iterable[str]) -> Iterator[tuple[str,
     for topic in topics:
         if topic not in heard:
             yield topic, nearest(topic, heard) or ""
+
+
+class Given(NamedTuple):
+    """What a program was started with: names of parameters, and remappings; and the nodes that came with it."""
+
+    program: Program
+    parameters: Sequence[str]
+    remappings: Mapping[str, str]
+    nodes: frozenset[str]
+
+
+def in_vain(given: Given, observations: Sequence[Observation]) -> Iterator[str]:
+    """Yield the parameters and remappings that a program was given and that change nothing of its nodes.
+
+    Nothing is said of a program that has failed or has no node: what it would have declared is not known.
+    """
+    program = given.program
+    if program.fault is not None or not given.nodes:
+        return
+    offers = [o for o in observations if isinstance(o, Offer) and o.process == program.name and o.kind == "parameter"]
+    declared = {offer.name.partition(":")[2] for offer in offers}
+    for name in given.parameters:
+        plain = name.rpartition(":")[2]
+        if plain not in declared and plain not in PARAMETERS_OF_EVERY_NODE:
+            what = f"{program.name}: the parameter {plain} was given, but no node of it declares that"
+            yield what + _meant(plain, declared)
+    graphs = [o for o in observations if isinstance(o, GraphSnapshot)]
+    used = {end.topic for graph in graphs for end in graph.endpoints if end.node in given.nodes}
+    used |= {end.service for graph in graphs for end in graph.services if end.node in given.nodes}
+    used |= {name.partition("/_action/")[0] for name in used}
+    for old, new in given.remappings.items():
+        hidden = old.startswith("__") or old.rpartition("/")[2] in NAMES_OF_EVERY_NODE
+        if not hidden and used.isdisjoint(_resolved(new, node) for node in given.nodes):
+            what = f"{program.name}: the remapping of {old} to {new} matches no topic or service of its nodes"
+            known = f"; they have {listed(sorted(used))}" if used else ""
+            yield what + (_meant(_resolved(old, min(given.nodes)), used) or known)
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    close = nearest(name, sorted(known))
+    return f"; did you mean {close}?" if close else ""
+
+
+def _plain(rule: str) -> str:
+    """Return the name in one side of a remapping, without the node or the kind that it is for."""
+    return rule.rpartition("://")[2].rpartition(":")[2]
+
+
+def _resolved(name: str, node: str) -> str:
+    """Return the full name of a topic or service of a node."""
+    plain = _plain(name)
+    if plain.startswith("/"):
+        return plain
+    return f"{node}{plain[1:]}" if plain.startswith("~") else f"{node.rpartition('/')[0]}/{plain}"
 
 
 class Sides(NamedTuple):

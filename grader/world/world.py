@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,9 +13,10 @@ from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
 
+from grader.grading.model.wording import listed, nearest
 from grader.runtime.message_classes import built, plain_fields
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.errors import GraderError
+from grader.runtime.model.errors import GraderError, RecordingError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import GIB, MIB, NS_PER_S, seconds
 from grader.runtime.model.trace import (
@@ -55,14 +57,27 @@ from grader.runtime.steps import (
     Publish,
     SendGoal,
     Serve,
+    ServeAction,
     Simulate,
     StartProcesses,
 )
 from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
+from grader.world.actions import ServedAction
+from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.interfaces import let_import, modules_for
-from grader.world.programs import Found, Messages, Program, Runnable, find_launch_file, find_program, parameter_values
+from grader.world.programs import (
+    Found,
+    Messages,
+    Parameters,
+    Program,
+    Runnable,
+    find_launch_file,
+    find_program,
+    given_parameters,
+    parameter_values,
+)
 
 Value = TypeVar("Value")
 Given = ParamSpec("Given")
@@ -86,6 +101,8 @@ OWN_LIMITS = Limits(
 )
 #: How long `settle` waits on the wall clock: a reaction takes some milliseconds, tens of them on a busy machine.
 REAL_SETTLE_S = 0.1
+#: Topics that every node has, which a recording is played without.
+EVERYWHERE = ("/rosout", "/parameter_events")
 #: What fails a test. A program that ends by itself does not: the test can look at its exit code.
 FAILING = (FaultKind.SYNTAX_ERROR, FaultKind.EXCEPTION, FaultKind.HUNG, FaultKind.KILLED)
 
@@ -107,14 +124,6 @@ def _with_hint(method: Callable[Given, Value]) -> Callable[Given, Value]:
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
-    """A message that a program published."""
-
-    t: float  # when, in seconds since the test began
-    message: Any  # the message, an object of its class
-
-
-@dataclass(frozen=True, slots=True)
 class Launched:
     """What was started of a launch file."""
 
@@ -123,13 +132,14 @@ class Launched:
 
 
 @dataclass(frozen=True, slots=True)
-class GoalResult:
-    """How a goal of an action ended."""
+class _Started:
+    """What a program was started as: what `restart` needs, and what is told if it changes nothing."""
 
-    accepted: bool
-    status: int  # as in action_msgs/msg/GoalStatus, 0 if it was not accepted
-    result: Any  # the result, an object of its class; None if it was not accepted
-    feedback: list[Received]  # the feedback to this goal
+    found: Found
+    start: PlannedStart
+    env: Mapping[str, str]
+    parameters: tuple[str, ...]
+    remappings: Mapping[str, str]
 
 
 class Failure:
@@ -211,6 +221,7 @@ class World:
         self._graph = GraphSnapshot(0, (), ())
         self._programs: dict[str, Program] = {}
         self._functions: dict[str, tuple[Any, Callable[[Any], Any]]] = {}
+        self._actions: dict[str, ServedAction] = {}
         self._offers: dict[str, Endpoint] = {}
         self._expected: list[Failure] = []
         self._failing: list[tuple[Program, Fault]] = []
@@ -218,6 +229,8 @@ class World:
         self._fits = True  # whether nothing has changed since it was looked at whether types and QoS fit
         self._mismatches: set[str] = set()
         self.left_out: list[str] = []
+        self._given: list[telling.Given] = []
+        self._started_as: dict[str, _Started] = {}
         self._goals = 0
         self._random: Random | None = None
         self._starting = self._judging = False
@@ -234,7 +247,7 @@ class World:
         *,
         name: str = "",
         namespace: str = "",
-        parameters: Mapping[str, Any] | None = None,
+        parameters: Parameters | Sequence[Parameters] | None = None,
         remappings: Mapping[str, str] | None = None,
         arguments: Sequence[str] = (),
         env: Mapping[str, str] | None = None,
@@ -249,29 +262,66 @@ class World:
                 package in the same workspace; or `main` of a module, or the function of an entry point.
             name: Name of its node, instead of its own.
             namespace: Namespace of its node.
-            parameters: Values of its parameters.
+            parameters: Values of its parameters by name, or a parameter file, looked for like a program; or several of
+                these, of which the last one counts most.
             remappings: New names of topics and services by their old ones.
             arguments: Arguments before the ROS arguments.
             env: Further environment variables.
 
         Raises:
-            SubmissionError: There is no such program.
+            SubmissionError: There is no such program, or no such parameter file.
             ProgramFailed: It has failed at once.
         """
         __tracebackhide__ = True
         found = self._found(program)
-        label = self._unused(found.name)
+        values, files = given_parameters(parameters, self._near)
         start = PlannedStart(
-            label,
+            found.name,
             executable=found.executable,
             arguments=tuple(map(str, arguments)),
-            ros_arguments=ros_arguments(
-                name, namespace, (remappings or {}).items(), parameter_values(parameters or {})
-            ),
+            ros_arguments=ros_arguments(name, namespace, (remappings or {}).items(), parameter_values(values)),
+            parameter_files=files,
         )
+        return self._started(_Started(found, start, dict(env or {}), tuple(values), dict(remappings or {})))
+
+    def _started(self, one: _Started) -> Program:
+        """Start a program that has been found, under a name that none has."""
+        __tracebackhide__ = True
+        found, label = one.found, self._unused(one.found.name)
+        start = replace(one.start, process=label)
         self._programs[label] = started = Program(label, found.root, self._signal, self._catch_up)
-        self._perform(StartProcesses(self._plan_of(found, start, env or {}), settle=not self._plan.drawn_order))
+        before = {*self._graph.nodes}
+        self._started_as[label] = one
+        self._perform(StartProcesses(self._plan_of(found, start, one.env), settle=not self._plan.drawn_order))
+        nodes = frozenset({*self._graph.nodes} - before)
+        self._given.append(telling.Given(started, one.parameters, one.remappings, nodes))
         return started
+
+    def restart(self, program: Program, *, timeout: float = 10.0) -> Program:
+        """Stop a program as Ctrl-C does, let time pass until it has ended, and start it again as `run` started it.
+
+        A program that has ended, such as one that was killed, is just started again.
+
+        Args:
+            program: The program; one that a launch file started cannot be restarted.
+            timeout: Seconds to wait at most until it has ended.
+
+        Returns:
+            The new program; the old one keeps its logs, output and exit code.
+
+        Raises:
+            StepTimeout: It has not ended in time.
+            ProgramFailed: It has failed, or the new one has failed at once.
+        """
+        __tracebackhide__ = True
+        if program.name not in self._started_as:
+            raise ValueError(
+                f"{program.name}: expected a program that was started with run, found one of a launch file"
+            )
+        if program.running:
+            program.interrupt()
+            self.wait_until(lambda: not program.running, timeout)
+        return self._started(self._started_as[program.name])
 
     @_with_hint
     def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Launched:
@@ -393,6 +443,37 @@ class World:
         asked = {"it asks for": [str(error) for error in lacking]}
         raise self._timeout("the condition did not hold", since_ns, asked, *(error.hint for error in lacking))
 
+    def wait_for_log(self, match: str, timeout: float, *, program: Program | None = None) -> LogRecord | OutputLine:
+        """Let time pass until a program has logged or written something, and return that; what is there already counts.
+
+        Args:
+            match: A regular expression that is found in the text of a log record, or in a line of output.
+            timeout: Seconds to wait at most.
+            program: Whose text it is; None for any program's.
+
+        Raises:
+            StepTimeout: Nothing of that kind came in time.
+            ProgramFailed: A program has failed meanwhile.
+        """
+        __tracebackhide__ = True
+        since_ns, pattern, seen = self._begin_ns(), re.compile(match), 0
+
+        def look() -> LogRecord | OutputLine | None:
+            nonlocal seen
+            new, seen = self._observations[seen:], len(self._observations)
+            for one in new:
+                if not isinstance(one, (LogRecord, OutputLine)):
+                    continue
+                if (program is None or one.process == program.name) and pattern.search(one.text):
+                    return one
+            return None
+
+        found: Any = self._until(look, since_ns + round(timeout * NS_PER_S))
+        if isinstance(found, (LogRecord, OutputLine)):
+            return found
+        who = "no program has" if program is None else f"{program.name} has not"
+        raise self._timeout(f"{who} logged or written {match!r}", since_ns, {})
+
     def _until(self, look: Callable[[], Value | None], deadline_ns: int) -> Value | None:
         """Let time pass until a function returns something true, and return that; what it returns last otherwise."""
         __tracebackhide__ = True
@@ -453,18 +534,62 @@ class World:
         types = {interface for interface, _ in packed}
         if len(types) > 1:
             raise TypeError(f"{topic}: expected messages of one type, found {', '.join(sorted(types))}")
-        reliability, durability = qos_words(qos)
-        command = Publish(
-            topic,
-            packed[0][0],
-            tuple(data for _, data in packed),
-            period_ns=0 if rate is None else round(NS_PER_S / rate),
-            best_effort=reliability == "best_effort",
-            latched=durability == "transient_local",
-        )
+        period_ns = 0 if rate is None else round(NS_PER_S / rate)
+        self._offer(Publish(topic, packed[0][0], tuple(data for _, data in packed), period_ns), qos)
+
+    def _offer(self, command: Publish, qos: QoSProfile | None) -> None:
+        __tracebackhide__ = True
+        topic, (reliability, durability) = command.topic, qos_words(qos)
         self._offers[topic] = Endpoint("publisher", topic, command.type, "the test", -1, reliability, durability)
         self._fits = False
-        self._perform(command)
+        best_effort, latched = reliability == "best_effort", durability == "transient_local"
+        self._perform(replace(command, best_effort=best_effort, latched=latched))
+
+    @_with_hint
+    def play(
+        self, bag: str | Path, *, topics: Iterable[str] | None = None, rate: float = 1.0, qos: QoSProfile | None = None
+    ) -> float:
+        """Publish the messages of a recording from now on, with the times between them that they were recorded with.
+
+        On each topic that replaces what the test published there before. The first message is sent now.
+
+        Args:
+            bag: A rosbag2 folder, or a .mcap or .db3 file, looked for like a program.
+            topics: The topics to play; None for all of them, without those that every node has, and without what the
+                grader adds to a recording of its own.
+            rate: How many times as fast as they were recorded.
+            qos: Reliability and durability of the publishers; reliable and volatile by default.
+
+        Returns:
+            How many seconds it takes until the last message.
+
+        Raises:
+            RecordingError: There is no such recording, it cannot be read, or it lacks a topic.
+            WrongType: A program subscribes to a topic, and no message would ever arrive.
+        """
+        __tracebackhide__ = True
+        from grader.runtime.recording.bag import read_bag, topics_in  # noqa: PLC0415 - few tests play a recording
+        from grader.runtime.recording.recording_file import OWN  # noqa: PLC0415 - the same
+
+        if rate <= 0:
+            raise ValueError(f"expected a rate above 0, found {rate:g}")
+        path = next((found for folder in self._near if (found := folder / bag).exists()), Path(bag))
+        types = topics_in(path)
+        recorded = [topic for topic in types if not topic.startswith(OWN) and topic not in EVERYWHERE]
+        wanted = recorded if topics is None else [_absolute(topic) for topic in topics]
+        if lacking := [topic for topic in wanted if topic not in types]:
+            close = nearest(lacking[0], recorded)
+            hint = f"did you mean {close}?" if close else f"it has {listed(sorted(recorded))}"
+            raise RecordingError(f"{bag}: expected the topic {lacking[0]}, found none", hint)
+        streams = [read_bag(path, topic, types[topic]) for topic in wanted]
+        began_ns = min((one.began_ns for one in streams), default=0)
+        last_ns = 0
+        for one in streams:
+            times_ns = tuple(round((one.began_ns - began_ns + message.t_ns) / rate) for message in one.messages)
+            messages = tuple(message.cdr for message in one.messages)
+            self._offer(Publish(one.topic, one.type, messages, times_ns=times_ns), qos)
+            last_ns = max(last_ns, times_ns[-1])
+        return seconds(last_ns)
 
     def stop_publishing(self, topic: str) -> None:
         """End what the test publishes on a topic; its publisher stays."""
@@ -496,6 +621,39 @@ class World:
         self._fits = False
         self._perform(Serve(name, interface))
 
+    def serve_action(
+        self,
+        name: str,
+        type: Any,  # noqa: A002 - as in rclpy
+        answer: Callable[[Any], Any] | Sequence[Any],
+    ) -> None:
+        """Offer an action; serving it again replaces what answers goals from then on.
+
+        Args:
+            name: Its name.
+            type: The class of the action, such as `test_msgs.action.Fibonacci`.
+            answer: What is done with each goal: a list of steps, or a function that is called with the goal while
+                virtual time stands still. It returns the result, or is a generator, which goes on beside everything
+                else. A step, or what a generator yields, is a number of seconds to let pass, or a feedback to publish.
+                A list may end with the result, as a generator does that returns it; without one, the result has its
+                default values. `GoalRejected` before the first pause refuses the goal, `GoalAborted` aborts it, and a
+                generator whose goal is cancelled gets `GoalCanceled`: it may return a result. An error ends a list.
+
+        Raises:
+            WrongType: A program has a client of another type.
+        """
+        __tracebackhide__ = True
+        name, interface = _absolute(name), type_name(type, "action")
+        known = self._actions.get(name)
+        if known is not None and known.type != interface:
+            raise ValueError(f"{name}: expected {known.type}, as it is served already, found {interface}")
+        if known is not None:
+            known.answer = answer
+            return
+        self._actions[name] = ServedAction(name, interface, answer)
+        self._fits = False
+        self._perform(ServeAction(name, interface))
+
     def call(self, name: str, request: Any, *, timeout: float = 10.0) -> Any:
         """Call a service, let time pass until the response is there, and return it.
 
@@ -509,18 +667,53 @@ class World:
             StepTimeout: There was no response in time; the message says whether there is a server.
         """
         __tracebackhide__ = True
+        return self.call_async(name, request).wait(timeout)
+
+    def call_async(self, name: str, request: Any) -> PendingCall:
+        """Call a service, and return at once; the request is sent with the next step, when its server is there.
+
+        Args:
+            name: Its name.
+            request: The request, such as `Trigger.Request()`.
+
+        Returns:
+            The call, which has the response once that is there.
+
+        Raises:
+            WrongType: The server is of another type.
+        """
+        __tracebackhide__ = True
         name = _absolute(name)
         interface, kind = type_of_part(request, "Request", name)
         self._refuse_other_server(name, interface, name)
         since_ns, seen = self._begin_ns(), len(self._observations)
         told = self._perform(CallService(name, interface, plain_fields(request)))
 
-        found = self._until(lambda: self._response(seen, name, told["client"]), since_ns + round(timeout * NS_PER_S))
-        if found is not None:
-            return built(kind.Response, found.value, name)
-        offered = any((e.service, e.type) == (name, interface) for e in telling.service_ends(self._graph, "service"))
-        why = f"{name} has a server, which has not answered" if offered else self._no_server(name, interface)
-        raise self._timeout(f"{name} did not answer", since_ns, {"the service": [why]})
+        def look() -> Any:
+            found = self._response(seen, name, told["client"])
+            return None if found is None else built(kind.Response, found.value, name)
+
+        def wait(timeout: float) -> Any:
+            __tracebackhide__ = True
+            found = self._until(look, self._begin_ns() + round(timeout * NS_PER_S))
+            if found is not None:
+                return found
+            servers = telling.service_ends(self._graph, "service")
+            offered = any((e.service, e.type) == (name, interface) for e in servers)
+            why = f"{name} has a server, which has not answered" if offered else self._no_server(name, interface)
+            raise self._timeout(f"{name} did not answer", since_ns, {"the service": [why]})
+
+        return PendingCall(name, self._caught_up(look), wait)
+
+    def _caught_up(self, look: Callable[[], Value]) -> Callable[[], Value]:
+        """Return a function that looks at what has happened until now."""
+
+        def looked() -> Value:
+            __tracebackhide__ = True
+            self._catch_up()
+            return look()
+
+        return looked
 
     def send_goal(
         self, name: str, goal: Any, *, cancel_after: float | None = None, timeout: float = 60.0
@@ -538,6 +731,26 @@ class World:
             StepTimeout: There was no result in time.
         """
         __tracebackhide__ = True
+        return self._goal(name, goal, cancel_after).wait(timeout)
+
+    def send_goal_async(self, name: str, goal: Any) -> GoalHandle:
+        """Send a goal to an action, and return at once; it is sent with the next step, when its server is there.
+
+        Args:
+            name: Name of the action.
+            goal: The goal, such as `Fibonacci.Goal(order=5)`.
+
+        Returns:
+            Its handle, with which it can be looked at, waited for and cancelled.
+
+        Raises:
+            WrongType: The action is of another type.
+        """
+        __tracebackhide__ = True
+        return self._goal(name, goal, None)
+
+    def _goal(self, name: str, goal: Any, cancel_after: float | None) -> GoalHandle:
+        __tracebackhide__ = True
         name = _absolute(name)
         interface, kind = type_of_part(goal, "Goal", name)
         self._refuse_other_server(f"{name}/_action/send_goal", f"{interface}_SendGoal", name)
@@ -548,30 +761,39 @@ class World:
         told = self._perform(SendGoal(PlannedGoal(name, interface, since_ns, after_ns, plain_fields(goal), uuid)))
         sent, asked = told["clients"][:2]
 
-        def ended() -> GoalResult | None:
-            accepted = self._response(seen, f"{name}/_action/send_goal", sent)
-            result = self._response(seen, f"{name}/_action/get_result", asked)
-            if accepted is None or (accepted.value["accepted"] and result is None):
-                return None
-            if result is None:
-                return GoalResult(accepted=False, status=0, result=None, feedback=[])
-            feedback = [
-                Received(one.t, one.message.feedback)
-                for one in self.received(f"{name}/_action/feedback")
-                if tuple(one.message.goal_id.uuid) == uuid
-            ]
-            ending = built(kind.Result, result.value["result"], name)
-            return GoalResult(accepted=True, status=result.value["status"], result=ending, feedback=feedback)
+        def feedback() -> list[Received]:
+            got = self.received(f"{name}/_action/feedback")
+            return [Received(one.t, one.message.feedback) for one in got if tuple(one.message.goal_id.uuid) == uuid]
 
-        found = self._until(ended, since_ns + round(timeout * NS_PER_S))
-        if found is not None:
-            return found
-        accepted = self._response(seen, f"{name}/_action/send_goal", sent)
-        why = "it has accepted the goal" if accepted is not None else "it has not answered the goal"
-        servers = [one.service for one in telling.service_ends(self._graph, "service")]
-        offered = f"{name}/_action/send_goal" in (*servers, *(offer.name for offer in self.trace().of(Offer)))
-        first = {"the action": [why if offered else f"nobody offers the action {name}"]}
-        raise self._timeout(f"{name} gave no result", since_ns, first)
+        def look() -> tuple[bool | None, GoalResult | None]:
+            accepted = self._response(seen, f"{name}/_action/send_goal", sent)
+            if accepted is None:
+                return None, None
+            if not accepted.value["accepted"]:
+                return False, GoalResult(accepted=False, status=0, result=None, feedback=[])
+            result = self._response(seen, f"{name}/_action/get_result", asked)
+            if result is None:
+                return True, None
+            ending = built(kind.Result, result.value["result"], name)
+            return True, GoalResult(accepted=True, status=result.value["status"], result=ending, feedback=feedback())
+
+        def wait(timeout: float) -> GoalResult:
+            __tracebackhide__ = True
+            found = self._until(lambda: look()[1], self._begin_ns() + round(timeout * NS_PER_S))
+            if found is not None:
+                return found
+            why = "it has accepted the goal" if look()[0] else "it has not answered the goal"
+            servers = [one.service for one in telling.service_ends(self._graph, "service")]
+            offered = f"{name}/_action/send_goal" in (*servers, *(offer.name for offer in self.trace().of(Offer)))
+            first = {"the action": [why if offered else f"nobody offers the action {name}"]}
+            raise self._timeout(f"{name} gave no result", since_ns, first)
+
+        def cancel() -> None:
+            __tracebackhide__ = True
+            request = {"goal_info": {"goal_id": {"uuid": list(uuid)}}}
+            self._perform(CallService(f"{name}/_action/cancel_goal", "action_msgs/srv/CancelGoal", request))
+
+        return GoalHandle(name, self._caught_up(look), feedback, wait, cancel)
 
     def _response(self, seen: int, service: str, client: int) -> Response | None:
         """Return the response of a program to a client of the test, among the observations from a number on."""
@@ -806,6 +1028,11 @@ class World:
         return self._plan.drawn_order or bool(self._plan.connections)
 
     @property
+    def remarks(self) -> list[str]:
+        """Sentences about what the test has asked for in vain: parts of launch files, parameters and remappings."""
+        return [*self.left_out, *(text for one in self._given for text in telling.in_vain(one, self._observations))]
+
+    @property
     def problem(self) -> str:
         """Why what happened may be untrue, once the world is closed; empty if it is not."""
         clock = "the wall clock" if self._is_real else "virtual time"
@@ -891,6 +1118,7 @@ class World:
             return
         self._fits = True
         served = {name: type_name(kind) for name, (kind, _) in self._functions.items()}
+        served |= {f"{name}/_action/send_goal": f"{one.type}_SendGoal" for name, one in self._actions.items()}
         of_test = telling.Sides(self._offers.values(), {}, served)
         for found in telling.mismatches(self._graph, [of_test, *map(telling.sides_of, self._simulations)]):
             if found not in self._mismatches:
@@ -912,6 +1140,11 @@ class World:
             now = Moment(question["now_ns"], question["clock_ns"])
             answer = getattr(self._simulations[question["number"]], question["method"])(now, *question["arguments"])
             return dict(answer) if isinstance(answer, Mapping) else [*answer]
+        if question["ask"] == "action":
+            now = Moment(question["now_ns"], question["clock_ns"])
+            return self._actions[question["action"]].attend(
+                now, question["part"], question["number"], question["request"]
+            )
         name = question["service"]
         kind, function = self._functions[name]
         response = function(built(kind.Request, question["request"], name))

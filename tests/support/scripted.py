@@ -256,6 +256,23 @@ class ScriptedObserver:
         """Return how many processes have endpoints."""
         return len(self._world.claims)
 
+    def participants_of_nodes(self) -> dict[bytes, set[str]]:
+        """Return a participant of each process, with its nodes."""
+        return {
+            process.encode(): {c["name"] for c in claims if c["kind"] == "node"}
+            for process, claims in self._world.claims.items()
+        }
+
+    def has_namesakes(self) -> bool:
+        """Return whether nodes of one name are claimed."""
+        names = self.students_nodes()
+        return len({*names}) < len(names)
+
+    def say_farewell(self, participants: Iterable[bytes]) -> None:
+        """Let processes leave."""
+        for participant in participants:
+            self._world.claims.pop(participant.decode(), None)
+
     def notes(self) -> list[str]:
         """Return what is to be said of messages: nothing."""
         return []

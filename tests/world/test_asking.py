@@ -40,6 +40,24 @@ def test_a_goal_has_feedback_and_a_result(ros: World, fibonacci_server: Path) ->
         assert ros.now - began == pytest.approx(0.5 * (order - 1), abs=1e-4)
 
 
+def test_what_rclpy_stamps_itself_makes_no_pause_longer(ros: World, tmp_path: Path) -> None:
+    """A node that looks at no clock sleeps exactly as long as it says, and so does its own clock."""
+    (tmp_path / "server.py").write_text(
+        "import time\nimport rclpy\nfrom rclpy.action import ActionServer\nfrom rclpy.duration import Duration\n"
+        "from test_msgs.action import Fibonacci\nrclpy.init()\nnode = rclpy.create_node('server')\n"
+        "def execute(goal):\n"
+        "    for number in range(4):\n"
+        "        goal.publish_feedback(Fibonacci.Feedback(sequence=[number]))\n"
+        "        node.get_clock().sleep_for(Duration(seconds=0.25)) if number % 2 else time.sleep(0.5)\n"
+        "    goal.succeed()\n"
+        "    return Fibonacci.Result()\n"
+        "server = ActionServer(node, Fibonacci, 'count', execute)\nrclpy.spin(node)\n"
+    )
+    ros.run(tmp_path / "server.py")
+    outcome = ros.send_goal("/count", Fibonacci.Goal())
+    assert [one.t for one in outcome.feedback] == [0.0, 0.5, 0.75, 1.25]
+
+
 def test_a_goal_of_another_type_is_an_error(ros: World, fibonacci_server: Path) -> None:
     """No server would ever answer it."""
     ros.run(fibonacci_server)
@@ -179,6 +197,29 @@ def test_a_launch_file_starts_its_nodes(ros_session: Worlds, workspace: Path) ->
         assert ros.rate("/talk") == pytest.approx(5)
         again = ros.launch("../launch/listener.launch.py")
         assert [program.name for program in again.programs] == ["robot/listener (2)"]
+
+
+def test_a_launch_file_does_not_find_what_colcon_leaves_out(ros_session: Worlds, workspace: Path) -> None:
+    """It ends as in ROS, although another package has an executable of that name."""
+    manifest = (workspace.parent / "package.xml").read_text(encoding="utf-8")
+    for name in ("other", "third"):
+        other = Path(shutil.copytree(workspace.parent, workspace.parents[1] / name))
+        (other / "package.xml").write_text(manifest.replace("<name>robot<", f"<name>{name}<"), encoding="utf-8")
+    (workspace.parents[1] / "other/COLCON_IGNORE").touch()
+    launch = (
+        "from launch import LaunchDescription\nfrom launch_ros.actions import Node\n\n\n"
+        "def generate_launch_description():\n"
+        "    return LaunchDescription([Node(package='{}', executable='talker')])\n"
+    )
+    (workspace / "ignored.launch.py").write_text(launch.format("other"), encoding="utf-8")
+    (workspace / "lacking.launch.py").write_text(launch.format("elsewhere"), encoding="utf-8")
+    with ros_session.open(workspace) as ros:
+        told = r"ignored\.launch\.py:6: PackageNotFoundError: package .other. not found: .* other/COLCON_IGNORE"
+        with pytest.raises(HarnessError, match=told):
+            ros.launch("ignored.launch.py")
+        told = r"elsewhere/talker was not started: the workspace has no package elsewhere"
+        with pytest.raises(HarnessError, match=told):
+            ros.launch("lacking.launch.py")
 
 
 def test_a_launch_file_that_fails_is_told_with_its_line(ros_session: Worlds, tmp_path: Path) -> None:

@@ -354,6 +354,38 @@ def test_a_message_package_beside_the_test_is_not_taken_for_a_folder(suite: pyte
     run(suite, BESIDE).assert_outcomes(passed=1)
 
 
+GIVEN = """
+def test_that_passes(ros):
+    remappings = {"/inn": "/words", "/out": "/said"}
+    ros.run("echo.py", name="e", parameters={"deley": 1.0, "use_sim_time": False}, remappings=remappings)
+    ros.advance(1.0)
+
+def test_that_fails(ros):
+    ros.run("echo.py", parameters={"e:nothing": 1}, remappings={"~/x": "y"})
+    ros.advance(1.0)
+    assert ros.now == 2.0
+
+def test_with_nothing_to_tell(ros):
+    ros.run("echo.py", namespace="/a", remappings={"/in": "words", "/out": "~/said"})
+    assert sorted(ros.topics()) == ["/a/echo/said", "/a/words"]
+"""
+
+
+def test_parameters_and_remappings_without_effect_are_told(suite: pytest.Pytester) -> None:
+    """With the failure of a test, and as a warning of one that passes."""
+    suite.makepyfile(test_it=GIVEN)
+    result = suite.runpytest_subprocess("-p", "grader.pytest_plugin", "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=2, failed=1, warnings=2)
+    text = result.stdout.str()
+    failure, _, warnings = text.partition("warnings summary")
+    assert "echo.py: the parameter nothing was given, but no node of it declares that" in failure
+    told = "echo.py: the remapping of ~/x to y matches no topic or service of its nodes; they have /in, /out"
+    assert told in failure
+    assert "echo.py: the parameter deley was given, but no node of it declares that" in warnings
+    told = "echo.py: the remapping of /inn to /words matches no topic or service of its nodes; did you mean /in?"
+    assert told in warnings
+
+
 def test_what_a_launch_file_has_and_was_not_started_is_told(suite: pytest.Pytester) -> None:
     """With the failure of a test, and as a warning of one that passes."""
     suite.makefile(

@@ -50,7 +50,8 @@ class VirtualClock:
         self._sent = 0
         self._ended_tasks = 0
         self._looked_at = False
-        self._was_looked_at = False
+        #: Whether the program has looked at a clock, so that it may pace itself by what it has seen.
+        self.was_looked_at = False
         self._seen_ns = 0
         #: The latest time that the program was shown, which may be after `now_ns`.
         self._shown_ns = 0
@@ -95,7 +96,7 @@ class VirtualClock:
             return self.now_ns + pause_ns
         self.count_pause()
         # If it is counted from a look, it ends at the deadline that the program has in mind, or after it.
-        late_ns = LATE_NS if self._was_looked_at else 0
+        late_ns = LATE_NS if self.was_looked_at else 0
         return max(self.now_ns, self._shown_ns) + pause_ns + late_ns
 
     def count_pause(self) -> None:
@@ -118,7 +119,7 @@ class VirtualClock:
         self.charge()
         self._looked_at = True
         if paces:
-            self._was_looked_at, self._seen_ns = True, self.now_ns
+            self.was_looked_at, self._seen_ns = True, self.now_ns
         self.idle_look()
         if not shown:
             return max(self.now_ns, self._shown_ns)

@@ -26,7 +26,7 @@ from rclpy.qos import (
 
 from . import originals
 from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
-from .events import Events
+from .events import ALIVE, Events
 from .node_parts import context_of, declared_by, ends_of, full_name_of, handle_of, name_of, seen_by
 from .protocol import Claim, Counterparts, Qos
 
@@ -140,6 +140,8 @@ class Ledger:
         #: The QoS of endpoints that took what was best when they were created.
         self._resolved: weakref.WeakKeyDictionary[Any, QoSProfile] = weakref.WeakKeyDictionary()
         self.events = Events()
+        #: Whether the program waits for an event that only the middleware can time, as has turned out.
+        self.is_timed = False
         #: The topics on which the state machines of lifecycle nodes publish transitions.
         self.transitions: weakref.WeakKeyDictionary[Any, str] = weakref.WeakKeyDictionary()
 
@@ -429,20 +431,26 @@ class Ledger:
             self._strangers.update(self._surplus(expected))
         return missing
 
-    def await_events(self, refused: Mapping[str, int], wait_s: float) -> list[str]:
+    def await_events(self, expected: Counterparts, wait_s: float) -> list[str]:
         """Wait, in real time, until the middleware has reported all counterparts, and let the program know.
 
         Args:
-            refused: As `Counterparts.refused`.
+            expected: The counterparts, as for `await_matches`.
             wait_s: Time-out in seconds.
 
         Returns:
             The names of the endpoints whose counterparts it has not all reported.
         """
-        most = {int(number): count for number, count in refused.items()}
+        most = {int(number): count for number, count in expected.refused.items()}
         told = originals.wait_until(lambda: not self._untold(most), wait_s)
         untold = [] if told else self._untold(most)
         self.events.tell()
+        for endpoint in self.alive("subscription") if expected.alive else ():
+            counts = expected.alive.get(str(self.numbers[endpoint]))
+            if counts:
+                self.events.live(endpoint.handle, *counts)
+            elif counts is not None:
+                self.is_timed |= self.events.has(endpoint.handle, ALIVE)
         return untold
 
     def _untold(self, refused: dict[int, int]) -> list[str]:

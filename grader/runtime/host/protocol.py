@@ -513,6 +513,9 @@ class Counterparts(NamedTuple):
     heard: Mapping[str, int] = NONE  # by service: how many servers get requests of its client that they cannot answer
     # By the number of an endpoint, as text: how many counterparts its QoS has not fitted so far
     refused: Mapping[str, int] = NONE
+    # By the number of a subscription with a lease, as text: how many of its publishers live, and how many have been
+    # silent for the lease; empty if some have to show by hand that they live, which only the middleware times
+    alive: Mapping[str, Sequence[int]] = {}
     graph: Mapping[str, int] | None = None  # by kind and name: what the graph holds; None if its program does not look
 
 

@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 import weakref
+from collections import Counter
 from collections.abc import Callable, Iterator
 from types import CodeType, FrameType, SimpleNamespace
 from typing import Any
@@ -35,10 +36,12 @@ from rclpy.duration import Duration
 from rclpy.event_handler import QoSPublisherEventType, QoSSubscriptionEventType
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.qos import LivelinessPolicy
 from rclpy.time import Time
 
 from .actions import Counted, install_actions
 from .clock import VirtualClock
+from .events import ALIVE
 from .ledger import BACKGROUND, ENDS_OF_TOPICS, REAL_WAIT_SET, Ledger, asks_for_best, finite_ns, service_name
 from .node_parts import context_of, full_name_of
 from .order import ReadyOrder
@@ -63,7 +66,7 @@ TIMED_EVENTS = {
     ),
     "subscription": (QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,),
 }
-#: The event of a subscription that the middleware times if its publishers have to show that they live.
+#: The event of a subscription that the middleware times if its publishers have to show by themselves that they live.
 LEASED_EVENT = QoSSubscriptionEventType.RCL_SUBSCRIPTION_LIVELINESS_CHANGED
 #: The methods with which nodes query the whole graph.
 GRAPH_LOOKS = (
@@ -256,7 +259,10 @@ def install_clocks(clocks: RosClocks, scheduler: Scheduler, clock: VirtualClock)
     now = Clock.now
 
     def looked_at(self: Clock) -> Time:
-        shown_ns = clock.look()
+        module = str(sys._getframe(1).f_globals.get("__name__"))
+        # rclpy stamps its own messages. What a sleep of it is counted from, a program that looks may compare with.
+        own = module.startswith("rclpy.")
+        shown_ns = clock.look(paces=not own, shown=not own or (module == "rclpy.clock" and clock.was_looked_at))
         if not clocks.follows(self):
             return now(self)
         with self.handle:  # raises if it was destroyed
@@ -960,8 +966,10 @@ def _register(ledger: Ledger, kind: str, cls: Any, leave: Callable[[], None], gi
         make(self, *args, **kwargs)
         ledger.add(kind, self)
         kinds = [handler.event_type for handler in self.event_handlers] if timed else []
-        leased = kind == "subscription" and LEASED_EVENT in kinds and _is_leased(self)
-        if leased or any(event in timed for event in kinds):
+        if kind == "subscription" and not _is_leased(self):
+            ledger.events.leave_alone(self.handle, ALIVE)
+        by_hand = kind == "subscription" and LEASED_EVENT in kinds and _is_leased(self) and _is_by_hand(self)
+        if by_hand or any(event in timed for event in kinds):
             give_up()
 
     def destroyed(self: Any) -> None:
@@ -975,6 +983,11 @@ def _register(ledger: Ledger, kind: str, cls: Any, leave: Callable[[], None], gi
 
 def _is_leased(subscription: Any) -> bool:
     return finite_ns(subscription.qos_profile.liveliness_lease_duration) > 0
+
+
+def _is_by_hand(subscription: Any) -> bool:
+    """Return whether the publishers of a subscription have to show that they live with each message."""
+    return bool(subscription.qos_profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC)
 
 
 def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None]) -> None:
@@ -1027,6 +1040,25 @@ def install_looks(clock: VirtualClock, ledger: Ledger, settle: Callable[[], None
     for owner, names in ((rclpy.node.Node, GRAPH_LOOKS), (_rclpy.Node, ACTION_LOOKS)):
         for name in names:
             looking(owner, name, lambda: at_the_graph(whole=True))
+    for name in ("get_node_names_and_namespaces", "get_node_names_and_namespaces_with_enclaves"):
+        _leave_out_gone_nodes(name)
+
+
+def _leave_out_gone_nodes(name: str) -> None:
+    """Let a method that lists nodes leave out those that have gone.
+
+    rmw_fastrtps learns of a participant's nodes and of its end on two threads. If the end comes first, the nodes return
+    for good. Each node that exists publishes the changes of its parameters.
+    """
+    listed = getattr(_rclpy.Node, name)
+
+    @functools.wraps(listed)
+    def existing(self: Any) -> Any:
+        publishers = _rclpy.rclpy_get_publishers_info_by_topic(self, "/parameter_events", False)  # noqa: FBT003 - C++
+        left = Counter((one["node_name"], one["node_namespace"]) for one in publishers)
+        return [found for found in listed(self) if left[found[:2]] > 0 and not left.subtract([found[:2]])]
+
+    setattr(_rclpy.Node, name, existing)
 
 
 def _note_ended_tasks(clock: VirtualClock) -> None:

@@ -232,9 +232,9 @@ class VirtualTime:
             self._charging.remove(thread)
 
     def depart(self) -> None:
-        """Do what `leave` does before the process may end at once, and tell the time if it has moved on its own."""
+        """Do what `leave` does before the process may end at once, and tell what has changed: time, and endpoints."""
         self.leave()
-        if self._ledger is not None and self._moved:
+        if self._ledger is not None and (self._moved or self._ledger.changed):
             self._settle()
 
     def _settle(self) -> None:
@@ -287,6 +287,8 @@ class VirtualTime:
         answer = self._answered(report)
         self.resumed_ns = self._real.processor_ns()
         self.running = True
+        if self._ledger is not None and self._ledger.is_timed:
+            self.give_up_outside("timed_event")
         if leaving and self._ledger is not None:
             self._ledger.settled()
         if isinstance(answer, Stop):
@@ -322,7 +324,7 @@ class VirtualTime:
             return Arrived()
         missing = self._ledger.await_matches(answer.expected, answer.wait_s)
         self._ledger.await_absence(answer.gone, answer.wait_s)
-        return Matched(missing, self._ledger.await_events(answer.expected.refused, answer.wait_s))
+        return Matched(missing, self._ledger.await_events(answer.expected, answer.wait_s))
 
     def _interrupt(self) -> None:
         """Receive the stop signal as from Ctrl-C, while the grader keeps control of time.

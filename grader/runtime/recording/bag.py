@@ -77,7 +77,7 @@ def read_bag(
     span_ns = raw[-1][0] - raw[0][0]
     if span_ns < least.span_ns:
         raise _too_short(path, found, f"at least {seconds(least.span_ns):g} s, found {seconds(span_ns):.2f} s")
-    return Recording(found, type_, tuple(_decoded(path, found, type_, raw, define)))
+    return Recording(found, type_, tuple(_decoded(path, found, type_, raw, define)), began_ns=raw[0][0])
 
 
 def topics_in(path: Path) -> Mapping[str, str]:

@@ -133,6 +133,8 @@ ROSOUT = "/rosout"
 OUTPUT, GRAPH, FAULTS, OFFERS, MARKS, CALLS = (
     f"/grader/{name}" for name in ("output", "graph", "faults", "offers", "marks", "calls")
 )
+#: What the topics of the recording itself begin with, beside those of the nodes.
+OWN = "/grader/"
 #: Messages that cannot be decoded, or whose type has no known definition.
 UNDECODED = "/grader/undecoded"
 #: Information about the whole recording, once at its beginning.
@@ -205,7 +207,7 @@ def _message(message: Message | Delivery, brought: Mapping[str, Definition]) -> 
 def _check_name(topic: str) -> None:
     """Raise Unknown for an invalid ROS topic, or one that looks like the grader's own."""
     plain_name = topic.isascii() and topic.isprintable() and topic.startswith("/") and len(topic) < 256
-    if not plain_name or topic == ROSOUT or topic.startswith("/grader/"):
+    if not plain_name or topic == ROSOUT or topic.startswith(OWN):
         raise UnknownType(topic)
 
 

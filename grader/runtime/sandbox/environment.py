@@ -10,6 +10,7 @@ from pathlib import Path
 import grader
 from grader.runtime.host.machine import ADDRESS, ADDRESS_6, BACKEND, HOST_NAME, SHELL, USER, USER_ID
 from grader.runtime.model.releases import DEFAULT, release_of
+from grader.runtime.model.trace import ClockKind
 from grader.runtime.ros_installation import PythonRuntime
 from grader.runtime.sandbox.protocol import StudentProcess
 
@@ -33,6 +34,10 @@ FEW_RESOURCES: Mapping[str, str] = {
 }
 
 
+#: What the names of profiles end with whose participants stay in the graph until somebody ends their lease.
+VIRTUAL = "_virtual"
+
+
 def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
     """Return the variable that names a Fast DDS profile in a folder, as the process sees it.
 
@@ -43,9 +48,20 @@ def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
     return {"FASTDDS_DEFAULT_PROFILES_FILE": f"{folder}/{name}3.xml"}
 
 
-def quick_discovery(host_folder: str | Path, runtime: PythonRuntime) -> dict[str, str]:
-    """Return the variable that makes Fast DDS repeat discovery quickly; the profile is in the host package."""
-    return dds_profile(host_folder, "fastdds", distro_of(runtime.environment))
+def quick_discovery(host_folder: str | Path, runtime: PythonRuntime, clock: str = "") -> dict[str, str]:
+    """Return the variable that makes Fast DDS repeat discovery quickly; the profile is in the host package.
+
+    On the virtual clock, the middleware does not end the lease of a process, which it would count in real time.
+    """
+    name = f"fastdds{VIRTUAL if clock == ClockKind.VIRTUAL.value else ''}"
+    return dds_profile(host_folder, name, distro_of(runtime.environment))
+
+
+def on_loopback(folder: str | Path, environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the variable that keeps Fast DDS to the loopback address, by a profile for the same clock in a folder."""
+    known = dds_profile("", "", distro_of(environment))
+    virtual = any(VIRTUAL in environment.get(name, "").rpartition("/")[2] for name in known)
+    return dds_profile(folder, f"loopback{VIRTUAL if virtual else ''}", distro_of(environment))
 
 
 def distro_of(environment: Mapping[str, str]) -> str:

@@ -24,7 +24,7 @@ from grader.runtime.model.errors import EnvironmentFault, HarnessError
 from grader.runtime.model.limits import Limits
 from grader.runtime.sandbox import seccomp
 from grader.runtime.sandbox.bubblewrap import ROOT_NAME, USER_NAME, Bubblewrap
-from grader.runtime.sandbox.environment import PACKAGE, dds_profile, distro_of, student_environment
+from grader.runtime.sandbox.environment import PACKAGE, on_loopback, student_environment
 from grader.runtime.sandbox.exposure import (
     STUDENT_GROUP,
     closed_folders,
@@ -301,7 +301,7 @@ def seen_in_place(process: StudentProcess, scratch: Path) -> str:
 
 def loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
     """Keep Fast DDS to the loopback address, on both sides: there is no network of one's own."""
-    return dds_profile(HERE, "loopback", distro_of(environment))
+    return on_loopback(HERE, environment)
 
 
 def require_domain(process: StudentProcess, tier: str) -> None:

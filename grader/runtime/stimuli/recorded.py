@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -33,11 +33,13 @@ class Recording:
         topic: Absolute name of the recorded topic.
         type: Type of its messages.
         messages: In order of receive time, which starts at 0 and strictly increases; at least one.
+        began_ns: When the first one was received, in nanoseconds since 1970.
     """
 
     topic: str
     type: str
     messages: tuple[TimedMessage, ...]
+    began_ns: int = field(default=0, compare=False)
 
     @property
     def span_ns(self) -> int:

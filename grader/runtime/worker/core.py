@@ -20,7 +20,7 @@ from grader.runtime.model.scenario import Event
 from grader.runtime.stimuli.calls import Ask
 from grader.runtime.stimuli.events import TopicEvent
 from grader.runtime.stimuli.simulation import Step
-from grader.runtime.worker.claims import ORDINARY_END, compatible, ends_of, passes, readers_of
+from grader.runtime.worker.claims import ORDINARY_END, compatible, ends_of, ends_of_kind, passes, readers_of
 
 #: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
 #: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
@@ -28,6 +28,8 @@ STEPS, STEPS_HZ = 400_000, 10_000
 #: Nodes may take messages so often while none of them lets time pass. After HOPS, each time also takes as long as a
 #: message needs between two processes; after MOST_HOPS they answer each other without end, and the run is over.
 HOPS, HOP_NS, MOST_HOPS = 200, 250_000, 4_000
+#: How long a participant that gives no sign of life stays in the graph: Fast DDS's own lease, from the last sign.
+LEASE_NS = 20 * NS_PER_S
 #: More messages of one report are not held back until all of them have arrived.
 MOST_ARRIVED = 1_000
 
@@ -64,6 +66,36 @@ class Process:
 
 
 P = TypeVar("P", bound=Process)
+
+
+@dataclass(frozen=True, slots=True)
+class Remains:
+    """What a process that ended without a farewell leaves in the graph, until the lease of its participants ends.
+
+    Attributes:
+        name: The name of the process.
+        claims: Its endpoints.
+        died_ns: When it ended.
+        witnesses: The processes that have known its endpoints. Whoever joins the graph later never hears of them,
+            because nobody announces them any more.
+    """
+
+    name: str
+    claims: list[Claim]
+    died_ns: int
+    witnesses: frozenset[str]
+
+    @property
+    def gone_ns(self) -> int:
+        """When its participants leave the graph."""
+        return self.died_ns + LEASE_NS
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseEnds(Event):
+    """The lease of a participant ends that gives no sign of life any more, or that of the liveliness of a publisher."""
+
+    remains: Remains
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +199,8 @@ class Agenda:
 
     def is_over(self, processes: Iterable[Process]) -> bool:
         """Return whether nothing more can happen: nobody is left, and what is published is published to nobody."""
-        return all(p.ended for p in processes) and not any(isinstance(d, (TopicEvent, Step)) for d in self.due)
+        going_on = (TopicEvent, Step, LeaseEnds)
+        return all(p.ended for p in processes) and not any(isinstance(d, going_on) for d in self.due)
 
 
 class Core(Generic[P]):
@@ -184,6 +217,7 @@ class Core(Generic[P]):
         processes: The processes.
         now_ns: Nanoseconds of virtual time since the start of the run.
         kept: How many messages each process has published on a topic of a latched publisher of its own.
+        remains: What processes have left in the graph that ended without a farewell.
     """
 
     def __init__(
@@ -201,11 +235,12 @@ class Core(Generic[P]):
         self._free_until_ns = 0
         self._steps = 0
         self._hops = 0
-        #: When the publishers of each process, by their numbers there, have appeared.
+        #: When the publishers and subscriptions of each process, by their numbers there, have appeared.
         self._appeared_ns: dict[tuple[str, int], int] = {}
         self.processes = processes
         self.now_ns = 0
         self.kept: Counter[tuple[str, str]] = Counter()
+        self.remains: list[Remains] = []
 
     # ---------------------------------------------------------- what to do next
 
@@ -330,11 +365,30 @@ class Core(Generic[P]):
         """Note that a process has ended, and its endpoints with it."""
         process.ended, process.wake_ns, process.claims = True, None, []
 
+    def lost(self, process: P) -> None:
+        """Note that a process is about to end without a farewell, so that its endpoints stay until its lease ends."""
+        claims = [claim for claim in process.claims if claim.kind != "parameter"]
+        if not claims:
+            return
+        others = [other for other in self.processes if other is not process and not other.ended]
+        remains = Remains(process.name, claims, self.now_ns, frozenset(o.name for o in others if o.claims))
+        self.remains.append(remains)
+        process.claims = []
+        leases = {
+            reader.qos.lease_ns
+            for writer in ends_of_kind(claims, "publisher")
+            for other in others
+            for reader in readers_of(other.claims, writer.name)
+            if compatible(writer, reader) and 0 < reader.qos.lease_ns < LEASE_NS
+        }
+        for lease_ns in sorted({*leases, LEASE_NS}):
+            self._agenda.later(LeaseEnds(self.now_ns + lease_ns, remains))
+
     def has(self, process: P, claims: list[Claim]) -> None:
         """Note which endpoints a process has: all of them, because it reports all of them each time."""
         process.claims, process.renewed = claims, True
         for claim in claims:
-            if claim.kind == "publisher":
+            if claim.kind in ("publisher", "subscription"):
                 self._appeared_ns.setdefault((process.name, claim.number), self.now_ns)
 
     def sent(self, sender: P, counts: Mapping[str, int]) -> None:
@@ -377,6 +431,10 @@ class Core(Generic[P]):
         """Return whether a process has a publisher on a topic that has appeared at this instant."""
         publishers = ends_of(process.claims, "publisher", topic)
         return any(self._appeared_ns.get((process.name, c.number)) == self.now_ns for c in publishers)
+
+    def appeared_ns(self, process: P, claim: Claim) -> int:
+        """Return when a publisher or a subscription of a process has appeared."""
+        return self._appeared_ns.get((process.name, claim.number), 0)
 
     def is_on_its_way(self, channel: str) -> bool:
         """Return whether messages of a channel are on their way to any process."""

@@ -11,7 +11,7 @@ from grader.runtime.model.trace import GraphSnapshot
 from grader.runtime.patience import SETTLE_S, Patience, Wait
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.worker.claims import CHANNELS, ORDINARY_END, answers, serves
-from grader.runtime.worker.core import Core
+from grader.runtime.worker.core import Core, Remains
 from grader.runtime.worker.matching import Match, Matching
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.service_peers import ServicePeers
@@ -53,6 +53,7 @@ class Discovery:
         *,
         wait: Wait,
     ) -> None:
+        self._core = core
         self._students = core.processes
         self.matching = Matching(core, services, observer.watching)
         self._observer = observer
@@ -66,12 +67,16 @@ class Discovery:
         self._found: Counter[Key] = Counter()
         self._known: set[Key] = set()
         self._strangers: Counter[Key] = Counter()
+        #: The process of each participant that was seen, and the nodes of processes that were looked for.
+        self._owners: dict[bytes, str] = {}
+        self._owning: dict[str, set[str]] = {}
 
     def match(self, now_ns: int) -> None:
         """Wait until the graph shows exactly the endpoints that exist, and all of them are matched."""
         claims = self.matching.claims()
         # What a process that is about to leave has removed already, it tells when it goes on.
         staying = [c for s in self._staying() for c in s.claims]
+        staying += [c for remains in self._core.remains for c in remains.claims]
         if not self.patience.wait(lambda: self._holds(now_ns, staying), pause_s=GRAPH_PAUSE_S):
             self._recorder.note("an endpoint that a node created was not seen in the graph")
             self._query(now_ns)
@@ -111,9 +116,45 @@ class Discovery:
         if any(not student.ended for student in self._students):
             self.match(now_ns)
 
+    def note_participants(self, student: NodeProcess) -> None:
+        """Note which participants are of a process that has reported its endpoints: those that have come since.
+
+        A process may have several, and others may have nodes of the same names.
+        """
+        nodes = _nodes_of(student)
+        if nodes == self._owning.get(student.name):
+            return
+        self._owning[student.name] = nodes
+        for participant, names in self._observer.participants_of_nodes().items():
+            if names & nodes:
+                self._owners.setdefault(participant, student.name)
+
     def lose(self, student: NodeProcess) -> None:
-        """Note that a process ended without leaving the graph, so its endpoints stay there for a while."""
-        self._strangers += Counter(map(_key, student.claims))
+        """Note that a process ended without a farewell: its endpoints stay in the graph until its lease ends."""
+        self._owning.pop(student.name, None)
+        self.note_participants(student)
+        self._core.lost(student)
+
+    def end_lease(self, remains: Remains) -> None:
+        """Let whoever sees what a process has left know that a lease of it has ended, by the virtual clock.
+
+        The middleware's own lease is much longer in virtual time: it counts real time.
+        """
+        now_ns = self._core.now_ns
+        if now_ns < remains.gone_ns:
+            self.tell_all()
+            return
+        self._core.remains.remove(remains)
+        claims = self.matching.claims()
+
+        def has_left() -> bool:
+            # again, if it is still there: what it had sent before its end may have arrived only now
+            self._observer.say_farewell([p for p, name in self._owners.items() if name == remains.name])
+            self._query(now_ns)
+            return not self._surplus(claims)
+
+        self._departures.wait(has_left, pause_s=GRAPH_PAUSE_S)
+        self.match(now_ns)
 
     def _staying(self) -> list[NodeProcess]:
         return [s for s in self._students if not (s.ended or s.leaving)]
@@ -161,10 +202,10 @@ class Discovery:
         # The end of an action outlives its node, and is then in the list of none.
         nodes = [s.claims for s in self._staying() if any(c.kind == "node" for c in s.claims)]
         exchanging = {(c.kind, c.name, c.type) for own in nodes for c in own if c.kind in ("service", "client")}
-        # The middleware tells the services of one node of a name. A node lives on until it is collected, and a process
-        # that left may stay in the graph for its lease.
-        namesakes = any(kind == "node" and count > 1 for (kind, _, _), count in found.items())
-        return (namesakes or exchanging <= offered) and all(found[key] >= count for key, count in wanted.items())
+        # The middleware tells the services of one node of a name. A node lives on until it is collected, a process that
+        # died stays in the graph for its lease, and one that left may return.
+        told = exchanging <= offered or self._observer.has_namesakes()
+        return told and all(found[key] >= count for key, count in wanted.items())
 
     def _surplus(self, claims: list[Claim]) -> Counter[Key]:
         """Count the removed endpoints that are still in the graph, except known strangers."""
@@ -218,6 +259,10 @@ class Discovery:
 
     def _record(self) -> None:
         self._recorder.look(self._observer.with_qos(self._graph), self._observer.participants())
+
+
+def _nodes_of(student: NodeProcess) -> set[str]:
+    return {c.name for c in student.claims if c.kind == "node"}
 
 
 def _wanted(claims: list[Claim]) -> Counter[Key]:

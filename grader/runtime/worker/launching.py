@@ -30,11 +30,13 @@ from grader.runtime.model.trace import (
 )
 from grader.runtime.plan import Plan, PlannedStart
 from grader.runtime.programs.executables import (
+    IGNORED,
     Executable,
     executables,
     find_executable,
     find_loose,
     has_package,
+    ignored_packages,
     why_unknown,
 )
 from grader.runtime.usage import families, usage
@@ -176,22 +178,22 @@ def _description(student: NodeProcess) -> tuple[Launched | None, str]:
 
 def _launched(name: str, report: Launched, plan: Plan, places: Places) -> EvaluatedLaunch:
     root, known = Path(plan.root), dict(plan.start_of(name).known)
-    left_out: list[str] = []
-    unstarted: list[tuple[str, str]] = []
-    notes: list[str] = []
-    for one in report.left_out[:MOST_LEFT_OUT]:
-        words, text = _command(one), _left_out(name, one, places)
-        if only := _only_name(words):
-            unstarted.append((text, only))
-        else:
-            (notes if _is_harmless(words) else left_out).append(text)
+    left_out, unstarted, notes = _not_done(name, report, places)
+    ignored = ignored_packages(root) if plan.projects else {}
     made = EvaluatedLaunch()
     for node in report.nodes[:MOST_LAUNCHED]:
         package, wanted = _text(node.package), _text(node.executable)
         # Reported by a process that the student's code shares: only a package that is there is named.
         near = _text(node.near) if has_package(plan.projects, _text(node.near)) else ""
         known_package = has_package(plan.projects, package)
-        look = find_executable(root, plan.projects, package, wanted) if known_package else find_loose(root, wanted)
+        if not known_package and package in ignored:
+            folder = ignored[package].relative_to(root).as_posix()
+            text = f"PackageNotFoundError: package {quoted(package)} not found: colcon does not build it, because of"
+            return _failed(name, f"{text} {folder}/{IGNORED}", _place(name, node, places), left_out, unstarted)
+        # Where a program runs in place, its workspace is complete: another package's executable is another program.
+        is_complete = bool(plan.working and plan.projects)
+        loose = None if known_package or is_complete else find_loose(root, wanted)
+        look = find_executable(root, plan.projects, package, wanted) if known_package else loose
         # A package that is misspelt is not there, even if a file of the same name lies elsewhere.
         found = None if near else look
         where = _place(name, node, places)
@@ -202,13 +204,9 @@ def _launched(name: str, report: Launched, plan: Plan, places: Places) -> Evalua
             # As in ROS, where a launch file that names a program its package lacks starts nothing at all.
             if known_package or near:
                 text = _not_found(package, wanted, found, executables(root, plan.projects), near)
-                file, _, line = where.rpartition(":")
-                return EvaluatedLaunch(
-                    fault=Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0)),
-                    left_out=tuple(left_out),
-                    unstarted=tuple(unstarted),
-                )
-            sentence = f"{where}: {_program(package, wanted)} was not started: {_lacking(package)}"
+                return _failed(name, text, where, left_out, unstarted)
+            lacking = _lacking(package, "workspace" if is_complete else "submission")
+            sentence = f"{where}: {_program(package, wanted)} was not started: {lacking}"
             if package in ONLY_LOOKING:
                 notes.append(sentence)
             else:
@@ -224,6 +222,29 @@ def _launched(name: str, report: Launched, plan: Plan, places: Places) -> Evalua
         text = "describes no node"
         return EvaluatedLaunch(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
     return replace(made, left_out=tuple(left_out), unstarted=tuple(unstarted), notes=tuple(notes))
+
+
+def _not_done(name: str, report: Launched, places: Places) -> tuple[list[str], list[tuple[str, str]], list[str]]:
+    """Return what a launch file does that the grader does not, as in `left_out`, `unstarted` and `notes`."""
+    left_out: list[str] = []
+    unstarted: list[tuple[str, str]] = []
+    notes: list[str] = []
+    for one in report.left_out[:MOST_LEFT_OUT]:
+        words, text = _command(one), _left_out(name, one, places)
+        if only := _only_name(words):
+            unstarted.append((text, only))
+        else:
+            (notes if _is_harmless(words) else left_out).append(text)
+    return left_out, unstarted, notes
+
+
+def _failed(
+    name: str, text: str, where: str, left_out: Sequence[str], unstarted: Sequence[tuple[str, str]]
+) -> EvaluatedLaunch:
+    """Return that a launch file starts nothing, because of what it says at a place."""
+    file, _, line = where.rpartition(":")
+    fault = Fault(0, name, FaultKind.EXCEPTION, text, file if line else "", int(line or 0))
+    return EvaluatedLaunch(fault=fault, left_out=tuple(left_out), unstarted=tuple(unstarted))
 
 
 def _added(  # noqa: PLR0913  what one node consists of
@@ -266,8 +287,8 @@ def _program(package: str, wanted: str) -> str:
     return f"{package}/{wanted}" if plain else f"the program {quoted(f'{package}/{wanted}')}"
 
 
-def _lacking(package: str) -> str:
-    return f"the submission has no package {package if _NAME.fullmatch(package) else quoted(package)}"
+def _lacking(package: str, where: str = "submission") -> str:
+    return f"the {where} has no package {package if _NAME.fullmatch(package) else quoted(package)}"
 
 
 def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable], near: str) -> str:

@@ -9,7 +9,17 @@ from typing import Generic, Protocol
 from grader.runtime.host.protocol import NO_COUNTERPARTS, ORDINARY, Claim, Counterparts
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.stimuli.messages import PlannedMessages
-from grader.runtime.worker.claims import CHANNELS, ORDINARY_END, answers, compatible, fits, passes, readers_of, serves
+from grader.runtime.worker.claims import (
+    CHANNELS,
+    ORDINARY_END,
+    answers,
+    compatible,
+    ends_of_kind,
+    fits,
+    passes,
+    readers_of,
+    serves,
+)
 from grader.runtime.worker.core import Core, P, announce
 
 
@@ -71,8 +81,22 @@ class Matching(Generic[P]):
         self._refused: dict[tuple[str, int], set[tuple[str, int]]] = {}
 
     def claims(self) -> list[Claim]:
-        """Return the endpoints of all processes that have not ended."""
+        """Return the endpoints of all processes that have not ended, and those that others have left in the graph."""
+        return [*self._living(), *(c for remains in self._core.remains for c in remains.claims)]
+
+    def _living(self) -> list[Claim]:
         return [c for process in self._core.processes if not process.ended for c in process.claims]
+
+    def _seen_by(self, process: P) -> list[Claim]:
+        """Return the endpoints that a process sees: all, but for what was left in the graph before it came."""
+        seen = [remains for remains in self._core.remains if process.name in remains.witnesses]
+        return [*self._living(), *(c for remains in seen for c in remains.claims)]
+
+    def _counted_by(self, process: P, graph: Mapping[str, int]) -> dict[str, int]:
+        """Return how many endpoints of each name a process sees in the graph, of those that the grader sees."""
+        unseen = [remains for remains in self._core.remains if process.name not in remains.witnesses]
+        left = Counter(f"{c.kind} {c.name}" for remains in unseen for c in remains.claims)
+        return {name: seen for name, count in graph.items() if (seen := count - left[name]) > 0}
 
     def advertised(self, topic: str) -> None:
         """Note that a stimulus has a new publisher."""
@@ -124,11 +148,10 @@ class Matching(Generic[P]):
         Args:
             graph: How many endpoints of each name there are, for programs that query the graph.
         """
-        claims = self.claims()
         self._count_refused()
         for process in self._core.processes:
             if not process.ended and (process.claims or process.told != NO_COUNTERPARTS):
-                expected = self._expected(process, claims, graph)
+                expected = self._expected(process, self._seen_by(process), self._counted_by(process, graph))
                 gone = sorted(process.told.client.keys() - expected.client.keys())
                 again = (process.renewed or process.unmatched) and expected != NO_COUNTERPARTS
                 if expected == process.told and not again:
@@ -146,19 +169,25 @@ class Matching(Generic[P]):
         writers: dict[tuple[str, str], list[tuple[tuple[str, int], Claim]]] = {}
         for topic, interface in self.streams.items():
             writers.setdefault((topic, interface), []).append(((topic, self._writers[topic]), self.offered(topic)))
+        left = {remains.name: remains for remains in self._core.remains}
+        owners = [*((p.name, p.claims) for p in self._core.processes), *((r.name, r.claims) for r in left.values())]
         ends = [
-            ((student.name, claim.number), claim)
-            for student in self._core.processes
-            for claim in student.claims
+            ((name, claim.number), claim)
+            for name, claims in owners
+            for claim in claims
             if claim.kind in ("publisher", "subscription")
         ]
+
+        def is_seen(end: tuple[str, int], by: tuple[str, int]) -> bool:
+            return end[0] not in left or by[0] in left[end[0]].witnesses
+
         for end, claim in ends:
             if claim.kind == "publisher":
                 writers.setdefault((claim.name, claim.type), []).append((end, claim))
         for reader, wish in ends:
             same = writers.get((wish.name, wish.type), []) if wish.kind == "subscription" else []
             for writer, offer in same:
-                if not fits(offer.qos, wish.qos):
+                if is_seen(writer, reader) and is_seen(reader, writer) and not fits(offer.qos, wish.qos):
                     self._refused.setdefault(reader, set()).add(writer)
                     self._refused.setdefault(writer, set()).add(reader)
 
@@ -166,16 +195,36 @@ class Matching(Generic[P]):
         ends: dict[str, dict[str, list[int]]] = {
             kind: {} for kind in ("publisher", "subscription", "client", "service")
         }
-        heard, refused = {}, {}
+        heard, refused, alive = {}, {}, {}
         for claim in process.claims:
             count = self._counterparts(claim, claims)
             if count:
                 ends[claim.kind].setdefault(claim.name, []).append(count)
             elif claim.kind == "client" and (hearing := self._hearing(claim, claims)):
                 heard[claim.name] = hearing
+            if claim.kind == "subscription" and claim.qos.lease_ns:
+                alive[str(claim.number)] = self._alive(process, claim)
             if kept_apart := self._refused.get((process.name, claim.number)):
                 refused[str(claim.number)] = len(kept_apart)
-        return Counterparts(**ends, heard=heard, refused=refused, graph=dict(graph) if process.sees_graph else None)
+        looked_at = dict(graph) if process.sees_graph else None
+        return Counterparts(**ends, heard=heard, refused=refused, alive=alive, graph=looked_at)
+
+    def _alive(self, process: P, reader: Claim) -> list[int]:
+        """Count the publishers of a subscription with a lease that live, and those that have not for that lease.
+
+        Returns:
+            The two numbers; none where a publisher has to show that it lives, which only the middleware times.
+        """
+        living = [c for c in ends_of_kind(self._living(), "publisher") if compatible(c, reader)]
+        alive, silent = len(living), 0
+        for remains in self._core.remains:
+            left = [c for c in ends_of_kind(remains.claims, "publisher") if compatible(c, reader)]
+            living += left
+            # of a publisher that was found when it was dead already, nobody knows that it has ever lived
+            if process.name in remains.witnesses and self._core.appeared_ns(process, reader) <= remains.died_ns:
+                is_silent = self._core.now_ns >= remains.died_ns + reader.qos.lease_ns
+                alive, silent = alive + len(left) * (not is_silent), silent + len(left) * is_silent
+        return [] if any(c.qos.manual for c in living) else [alive, silent]
 
     def _counterparts(self, claim: Claim, claims: list[Claim]) -> int:
         kind, name = claim.kind, claim.name

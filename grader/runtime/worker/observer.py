@@ -29,6 +29,7 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, size
 from grader.runtime.model.trace import Endpoint, GraphSnapshot
 from grader.runtime.padding import without_padding
+from grader.runtime.worker import farewell
 from grader.runtime.worker.claims import BACKGROUND_TYPES
 from grader.runtime.worker.console import TEXT_CHARACTERS, Logged
 from grader.runtime.worker.core import Taken, in_order
@@ -36,10 +37,13 @@ from grader.runtime.worker.ros_names import asked, listed
 from grader.runtime.worker.service_ends import ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
+PARAMETER_EVENTS = "/parameter_events"
+BACKGROUND = frozenset({"/rosout", PARAMETER_EVENTS})
+#: So many bytes at the beginning of an endpoint's GUID are those of its participant.
+PREFIX_BYTES = 12
 #: When a message was sent and when it arrived, as `take_message` names what the middleware says. Its threads receive
 #: messages whatever the grader itself is busy with.
 TIMESTAMPS = ("source_timestamp", "received_timestamp")
-BACKGROUND = frozenset({"/rosout", "/parameter_events"})
 #: Queue depth, enough for everything that can be published between two polls.
 DEPTH = 5000
 #: The most messages of a topic, and bytes of all topics, that one poll takes; the rest is left for the next poll.
@@ -150,9 +154,8 @@ class Observer:
 
     def _endpoint(self, kind: str, topic: str, info: Any) -> Endpoint:
         own = info.node_name in self._names
-        # The first twelve bytes of an endpoint's GUID are those of its participant, and a process has one for each ROS
-        # context.
-        prefix = bytes(info.endpoint_gid[:12])
+        # A process has a participant for each ROS context.
+        prefix = bytes(info.endpoint_gid[:PREFIX_BYTES])
         number = -1 if own else self._participants.setdefault(prefix, len(self._participants))
         manual = info.qos_profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
         reliability, durability = _qos_words(info.qos_profile)
@@ -168,6 +171,22 @@ class Observer:
             liveliness="manual_by_topic" if manual else "automatic",
             lease_ns=_finite_ns(info.qos_profile.liveliness_lease_duration),
         )
+
+    def participants_of_nodes(self) -> dict[bytes, set[str]]:
+        """Return the full names of the students' nodes of each participant, whether they have endpoints or not.
+
+        Every node publishes the changes of its parameters.
+        """
+        found: dict[bytes, set[str]] = {}
+        for info in self._publishing():
+            if info.node_name not in self._names:
+                node = _full_name(info.node_name, info.node_namespace)
+                found.setdefault(bytes(info.endpoint_gid[:PREFIX_BYTES]), set()).add(node)
+        return found
+
+    def say_farewell(self, participants: Iterable[bytes]) -> None:
+        """Tell everybody in the domain that some participants have left, by the beginning of their GUIDs."""
+        farewell.say_for(participants, self._domain)
 
     def watch(self, endpoints: Iterable[Endpoint]) -> list[str]:
         """Subscribe to every topic that has a publisher; return the topics whose type is not installed.
@@ -230,10 +249,27 @@ class Observer:
     def _names_in_graph(self, existing: Collection[str] | None) -> list[tuple[str, str]]:
         known: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
         pairs = [p for p in known if p[0] not in {*self._names, UNKNOWN_NODE}]
-        return [p for p in pairs if existing is None or _full_name(*p) in existing or self._publishes_anything(*p)]
+        return pairs if existing is None else self._without_gone(pairs, existing)
 
-    def _publishes_anything(self, name: str, namespace: str) -> bool:
-        return bool(asked(self.node.get_publisher_names_and_types_by_node, name, namespace, nothing=[]))
+    def _without_gone(self, pairs: list[tuple[str, str]], existing: Collection[str] = ()) -> list[tuple[str, str]]:
+        """Return the names of the nodes that exist, of those that rmw_fastrtps lists: as often as they publish."""
+        publishing = Counter((info.node_name, info.node_namespace) for info in self._publishing())
+        return [
+            pair
+            for pair, count in Counter(pairs).items()
+            for _ in range(min(count, max(publishing[pair], int(_full_name(*pair) in existing))))
+        ]
+
+    def _publishing(self) -> list[Any]:
+        """Return the publishers of changes of parameters: each node has one."""
+        nobody: list[Any] = []
+        found: list[Any] = asked(self.node.get_publishers_info_by_topic, PARAMETER_EVENTS, nothing=nobody)
+        return found
+
+    def has_namesakes(self) -> bool:
+        """Return whether nodes of one name are listed, of which one may have gone: of one, the others hide the rest."""
+        names: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
+        return len({*names}) < len(names)
 
     def ends_of(self, kind: str, service: str) -> int:
         """Return the number of servers (`service`) or clients (`client`) of a service, including the grader's own."""
@@ -241,9 +277,13 @@ class Observer:
         return int(asked(count, service, nothing=0))
 
     def counts(self) -> dict[str, int]:
-        """Count the endpoints and nodes in the graph by name, as any node sees them, including the grader's own."""
+        """Count the endpoints and nodes in the graph by name, as any node sees them, including the grader's own.
+
+        Nodes that have gone are left out, as the host leaves them out for programs: see `students_nodes`.
+        """
         node = self.node
-        nodes: list[tuple[str, str]] = listed(node.get_node_names_and_namespaces)
+        known: list[tuple[str, str]] = listed(node.get_node_names_and_namespaces)
+        nodes = self._without_gone(known)
         topics: list[tuple[str, list[str]]] = listed(node.get_topic_names_and_types)
         services: list[tuple[str, list[str]]] = listed(node.get_service_names_and_types)
         found = Counter(f"node {_full_name(*pair)}" for pair in nodes)

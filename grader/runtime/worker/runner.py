@@ -179,8 +179,11 @@ class Runner(ABC):
                 if (arrived := self._arrival(event)) is not None:
                     self._agenda.later(arrived)
 
-    def _simulated(self, now_ns: int, service: str, request: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    def _simulated(
+        self, now_ns: int, service: str, request: Mapping[str, Any], number: int
+    ) -> Mapping[str, Any] | None:
         """Return the response to a request at a time; None if nothing but the plan says what it is."""
+        del number  # a simulation answers at once
         return self._simulations.answer(service, request, self._moment(now_ns))
 
     def _moment(self, now_ns: int) -> Moment:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from types import MappingProxyType
 from typing import Any
 
 from grader.runtime.message_classes import built, plain_fields, wanted_class
@@ -20,6 +21,8 @@ from grader.runtime.worker.trace_recorder import TraceRecorder
 
 #: The most requests and responses that are held before they are recorded.
 UNREAD = 50_000
+#: What says that a response comes later: the request stays open until then.
+LATER: Mapping[str, Any] = MappingProxyType({})
 #: The sender of a request or response.
 GRADER, STUDENT = "grader", "student"
 
@@ -43,7 +46,8 @@ class ServicePeers:
         recorder: Records requests and responses.
         nodes: Returns the names of the students' nodes.
         later: Schedules an event.
-        simulated: Returns the response of a simulation to a request at a time; None if none offers the service.
+        simulated: Returns the response of a simulation to a request at a time, which has a number among those to its
+            service; None if none offers the service, and `LATER` if it comes later.
 
     Raises:
         HarnessError: The plan names a type or field that is unknown on this machine.
@@ -57,7 +61,7 @@ class ServicePeers:
         *,
         nodes: Callable[[], Sequence[str]],
         later: Callable[[Event], None],
-        simulated: Callable[[int, str, Mapping[str, Any]], Mapping[str, Any] | None] = lambda *_: None,
+        simulated: Callable[[int, str, Mapping[str, Any], int], Mapping[str, Any] | None] = lambda *_: None,
     ) -> None:
         self._ends = ends
         self._recorder = recorder
@@ -207,13 +211,22 @@ class ServicePeers:
         self._recorder.exchange(Request(now_ns, plan.service, plan.type, number, STUDENT, 0, value), size)
         known = size <= self._message_bytes
         # A simulation decides first; a plan has responses only for servers of its own.
-        response = self._simulated(now_ns, request.service, value) if known else None
+        response = self._simulated(now_ns, request.service, value, number) if known else None
         response = plan.response(served.taken) if response is None else response
         if response is not None:
             served.unanswered[number] = (request.header, response)
+        if response is not None and response is not LATER:
             self._later(Respond(now_ns + plan.delay_ns, plan, number))
         # Counted last: the index of the response is the number of requests before this one.
         served.taken += 1
+
+    def respond(self, now_ns: int, service: str, number: int, fields: Mapping[str, Any]) -> bool:
+        """Send a response that was to come later; return whether it was sent."""
+        served = self._servers.get(service)
+        if served is None or number not in served.unanswered:
+            return False
+        served.unanswered[number] = (served.unanswered[number][0], fields)
+        return self.answer(now_ns, served.plan, number)
 
     def answer(self, now_ns: int, server: PlannedServer, number: int) -> bool:
         """Send the response to a request, if the server still exists; return whether it was sent."""

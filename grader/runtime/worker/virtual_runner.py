@@ -15,7 +15,19 @@ from grader.runtime.plan import Plan
 from grader.runtime.stimuli.calls import PlannedCalls
 from grader.runtime.stimuli.server import AddServer, RemoveServer
 from grader.runtime.worker.claims import ORDINARY_END, passes
-from grader.runtime.worker.core import Arriving, Command, Core, Limit, Play, Receive, Retry, RunProcess, Taken, senders
+from grader.runtime.worker.core import (
+    Arriving,
+    Command,
+    Core,
+    LeaseEnds,
+    Limit,
+    Play,
+    Receive,
+    Retry,
+    RunProcess,
+    Taken,
+    senders,
+)
 from grader.runtime.worker.discovery import Discovery
 from grader.runtime.worker.ending import ending
 from grader.runtime.worker.observer import Observer
@@ -84,10 +96,7 @@ class VirtualRunner(Runner):
         self._carry_out(self._core.run_on())
 
     def _last_look(self) -> int:
-        # Otherwise two recordings of one program would differ in their last snapshot.
-        if not any(s.ended for s in self._students):
-            # the endpoints of an ended process disappear at a random time
-            self._discovery.look(self._core.now_ns)
+        self._discovery.look(self._core.now_ns)
         return self._core.now_ns
 
     def _unfit(self) -> str:
@@ -165,6 +174,8 @@ class VirtualRunner(Runner):
         if isinstance(report, Exited):
             student.unsettled, student.exit_code = report.unsettled, report.code
             stopped, places = student.stop_signalled, student.places
+            if not report.left:
+                self._discovery.lose(student)
             self._end(student, ending(student.name, self._core.now_ns, report, self._plan, places, stopped=stopped))
             if report.left:
                 self._discovery.await_departure(self._core.now_ns)
@@ -197,6 +208,7 @@ class VirtualRunner(Runner):
             student.sees_graph = progress.sees_graph
             self._note_offers(student, student.claims, self._core.now_ns)
             self._discovery.match(self._core.now_ns)
+            self._discovery.note_participants(student)
             # A new endpoint may be the server that a call has waited for.
             for due in self._services.ready(self._is_served):
                 self._agenda.later(replace(due, t_ns=self._core.now_ns))
@@ -247,6 +259,9 @@ class VirtualRunner(Runner):
         return self._discovery.is_served(calls)
 
     def _do(self, event: Event, now_ns: int) -> None:
+        if isinstance(event, LeaseEnds):
+            self._discovery.end_lease(event.remains)
+            return
         super()._do(event, now_ns)
         if isinstance(event, (AddServer, RemoveServer)):
             self._discovery.tell_all()

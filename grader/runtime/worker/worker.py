@@ -312,7 +312,7 @@ class Worker:
             environment={
                 "ROS_DOMAIN_ID": str(domain),
                 "RCUTILS_COLORIZED_OUTPUT": "0",
-                **quick_discovery(self._isolation.host_seen_at, self._runtime),
+                **quick_discovery(self._isolation.host_seen_at, self._runtime, plan.clock),
                 "PYTHONHASHSEED": str(plan.hash_seed),
                 **dict(plan.environment),
             },

@@ -115,6 +115,7 @@ COUNTERPARTS = Counterparts(
     service={"/t": [2]},
     heard={"/u": 1},
     refused={"7": 1},
+    alive={"8": [1, 0]},
     graph={"publisher /x": 1},
 )
 ANSWERS: tuple[Answer, ...] = (
@@ -122,7 +123,9 @@ ANSWERS: tuple[Answer, ...] = (
     Stop(),
     Expect({"response /s": 1}),
     AwaitMatches(
-        Counterparts({"/x": [1, 2]}, {"/y": [1]}, {}, {}, {"/s": 1}, {"7": 1}, {"publisher /x": 1}), ["/s"], 0.5
+        Counterparts({"/x": [1, 2]}, {"/y": [1]}, {}, {}, {"/s": 1}, {"7": 1}, {"8": []}, {"publisher /x": 1}),
+        ["/s"],
+        0.5,
     ),
 )
 

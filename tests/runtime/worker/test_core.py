@@ -155,7 +155,7 @@ class Host:
         )
         self.time = VirtualTime(self, real)  # type: ignore[arg-type]
         self.ledger = self.time._ledger = SimpleNamespace(  # type: ignore[assignment]
-            **dict.fromkeys(("sending", "sending_and_removed", "changed", "sees_graph"), False),
+            **dict.fromkeys(("sending", "sending_and_removed", "changed", "sees_graph", "is_timed"), False),
             **{name: Counter() for name in ("sent", "early", "lost")},
             **{name: lambda *_: None for name in ("note_waited", "settled", "expect")},
             claims=lambda _: [],

@@ -602,3 +602,28 @@ def test_a_look_at_the_graph_sees_what_is_there(run: Callable[..., Trace]) -> No
     )
     told = [(line.text, line.t_ns // MS) for line in trace.lines()]
     assert told == [("0 2", 0), ("2", 1), ("True True", 1), ("gone", 1000)]
+
+
+@pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
+def test_a_node_without_a_farewell_leaves_when_its_lease_ends(run: Callable[..., Trace], clock: str) -> None:
+    """Not before, so that a node that starts meanwhile and one that was there see different graphs, as in reality."""
+    ending = TALKER + "publisher.publish(String())\ntime.sleep(1.5)\nos._exit(1)"
+    watching = """
+        rclpy.init()
+        node = Node('watcher')
+        seen = []
+        for _ in range(27):
+            now = node.count_publishers('/words'), node.get_node_names().count('talker')
+            if seen[-1:] != [now]:
+                seen.append(now)
+                print(*now, flush=True)
+            time.sleep(1)
+        """
+    programs = (watching, ending, watching.replace("'watcher'", "'late'"))
+    trace = run(*programs, clock=clock, duration_ns=28 * NS_PER_S, starts_ns=(("c.py", 3 * NS_PER_S),))
+    said = [(line.process, line.text, line.t_ns / NS_PER_S) for line in trace.lines()]
+    assert [text for process, text, _ in said if process == "a.py"][-2:] == ["1 1", "0 0"]
+    assert [text for process, text, _ in said if process == "c.py"] == ["0 0"]
+    # on the other clock, Fast DDS counts from the last announcement, some tenths of a second ago
+    if clock == "virtual":
+        assert [round(t) for process, text, t in said if (process, text) == ("a.py", "0 0")][-1] == 22

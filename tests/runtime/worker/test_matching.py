@@ -147,6 +147,36 @@ def test_a_match_and_a_refusal_wake_a_process() -> None:
     assert ends.asked() == {"talks": Counterparts(refused={"1": 2}), "hears": Counterparts(refused={"5": 1})}
 
 
+@pytest.mark.rule(19)
+def test_what_a_process_leaves_lives_until_the_lease_of_who_hears_it() -> None:
+    """It stays a counterpart of who was there until its participant has left; who comes later never sees it."""
+    ends = Endpoints(
+        dies=[claim("publisher", "/x", lease_ns=5)],
+        hears=[claim("subscription", "/x", number=2, lease_ns=7)],
+        late=[],
+    )
+    there = Counterparts(subscription={"/x": [1]}, alive={"2": [1, 0]})
+    assert ends.asked() == {"dies": Counterparts(publisher={"/x": [1]}), "hears": there}
+    ends.core.lost(ends.processes["dies"])
+    ends.core.ended(ends.processes["dies"])
+    ends.core.has(ends.processes["late"], [claim("subscription", "/x", number=3, lease_ns=7)])
+    assert ends.asked() == {"late": Counterparts(alive={"3": [0, 0]})}
+    ends.core.now_ns = 7
+    assert ends.asked() == {"hears": there._replace(alive={"2": [0, 1]})}
+    ends.core.remains.clear()
+    assert ends.asked() == {"hears": Counterparts(alive={"2": [0, 0]})}
+
+
+@pytest.mark.rule(19)
+def test_only_the_middleware_times_who_has_to_show_that_it_lives() -> None:
+    """One such publisher is enough: the numbers are told together."""
+    ends = Endpoints(
+        talks=[claim("publisher", "/x", lease_ns=5), claim("publisher", "/x", lease_ns=5, manual=True)],
+        hears=[claim("subscription", "/x", number=2, lease_ns=7)],
+    )
+    assert ends.asked()["hears"] == Counterparts(subscription={"/x": [2]}, alive={"2": []})
+
+
 def test_the_publisher_of_a_stimulus_is_matched_as_it_was_made() -> None:
     """Best effort where the rubric says so; the grader's own subscriptions to its topic count as well."""
     ends = Endpoints(

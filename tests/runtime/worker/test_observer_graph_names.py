@@ -60,3 +60,6 @@ def test_a_node_that_returns_after_its_participant_has_left_is_not_there() -> No
     assert seen.graph(0).nodes == ("/gone", "/new", "/young")
     assert seen.graph(0, existing={"/young"}).nodes == ("/new", "/young")
     assert seen.students_nodes({"/young"}) == ["/new", "/young"]
+    seen.node.get_service_names_and_types = list
+    seen.node.count_publishers = seen.node.count_subscribers = lambda _: 0
+    assert [name for name in seen.counts() if name.startswith("node ")] == ["node /new"]

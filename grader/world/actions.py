@@ -1,0 +1,214 @@
+"""Actions that a test offers: what a function or a list of steps does with each goal, in virtual time."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import field
+from enum import IntEnum
+from types import GeneratorType
+from typing import Any
+
+from grader.runtime.message_classes import built, message_class, plain_fields
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.serialization import action_type, bytes_of
+from grader.runtime.simulation import Moment
+from grader.world.errors import GoalAborted, GoalCanceled, GoalRejected
+
+
+class GoalState(IntEnum):
+    """What has become of a goal, as in action_msgs/msg/GoalStatus; it is executed as soon as it is accepted."""
+
+    UNKNOWN = 0
+    EXECUTING = 2
+    CANCELING = 3
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+
+
+STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
+
+
+#: The codes of an answer to a request to cancel, as in action_msgs/srv/CancelGoal: of goals that are being cancelled,
+#: of none that is known, of one that has ended.
+CANCELING, UNKNOWN_GOAL, ENDED = 0, 2, 3
+#: What each step of a goal is: seconds to let pass, or a feedback to publish.
+Steps = Generator[Any, None, Any]
+
+
+@dataclass
+class _Goal:
+    """A goal that was accepted.
+
+    Attributes:
+        uuid: Its id.
+        stamp_ns: When it was accepted, in nanoseconds since 1970.
+        steps: What goes on with it.
+        status: What has become of it.
+        wake_ns: When it goes on, since the run began; None when it has ended.
+        result: Its result, as fields, once it has ended.
+        asked: The numbers of the requests for its result that are open.
+    """
+
+    uuid: tuple[int, ...]
+    stamp_ns: int
+    steps: Steps
+    status: GoalState = GoalState.EXECUTING
+    wake_ns: int | None = None
+    result: Mapping[str, Any] = field(default_factory=dict)
+    asked: list[int] = field(default_factory=list)
+
+
+class ServedAction:
+    """An action, with its goals.
+
+    Args:
+        name: Its name.
+        type: Its type.
+        answer: See `World.serve_action`.
+    """
+
+    def __init__(self, name: str, type: str, answer: Callable[[Any], Any] | Sequence[Any]) -> None:  # noqa: A002
+        self.name = name
+        self.type = type
+        self.answer = answer
+        self._kind = action_type(type)
+        self._goals: dict[tuple[int, ...], _Goal] = {}
+        self._does: list[tuple[str, int, Any]] = []
+
+    def attend(self, now: Moment, part: str, number: int, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what is done at a moment: responses and messages in their order, and when to come back.
+
+        Args:
+            now: The moment.
+            part: What was asked: `send_goal`, `cancel_goal` or `get_result`; empty if time has passed.
+            number: The number of the request.
+            request: Its fields.
+        """
+        self._does = []
+        if part == "send_goal":
+            self._begin(now, number, request)
+        elif part == "cancel_goal":
+            self._cancel(now, number, request["goal_info"])
+        elif part == "get_result":
+            self._ask_for_result(number, tuple(request["goal_id"]["uuid"]))
+        else:
+            for goal in [one for one in self._goals.values() if one.wake_ns is not None and one.wake_ns <= now.t_ns]:
+                self._go_on(goal, now, lambda one=goal: next(one.steps))  # type: ignore[misc]
+        wakes = {one.wake_ns for one in self._goals.values() if one.wake_ns is not None and one.wake_ns > now.t_ns}
+        return {"does": self._does, "wakes_ns": sorted(wakes)[:1]}
+
+    def _begin(self, now: Moment, number: int, request: Mapping[str, Any]) -> None:
+        wanted = built(self._kind.Goal, request["goal"], self.name)
+        uuid = tuple(request["goal_id"]["uuid"])
+        goal = _Goal(uuid, now.clock_ns, self._steps(wanted))
+        before, self._does = self._does, []
+        try:
+            self._goals[uuid] = goal
+            self._go_on(goal, now, lambda: next(goal.steps))
+        except GoalRejected:
+            del self._goals[uuid]
+            self._does = [*before, ("send_goal", number, {"accepted": False})]
+            return
+        accepted = {"accepted": True, "stamp": _time(now.clock_ns)}
+        self._does = [*before, ("send_goal", number, accepted), *self._does]
+        if goal.wake_ns is not None:
+            self._tell_status()
+
+    def _steps(self, goal: Any) -> Steps:
+        """Go through what answers a goal; return the result."""
+        made = self.answer(goal) if callable(self.answer) else self.answer
+        if isinstance(made, GeneratorType):
+            return (yield from made)
+        if not isinstance(made, (list, tuple)):
+            return made
+        for step in made:
+            if isinstance(step, BaseException):
+                raise step
+            if isinstance(step, self._kind.Result):
+                return step
+            yield step
+        return None
+
+    def _go_on(self, goal: _Goal, now: Moment, move: Callable[[], Any]) -> None:
+        """Let a goal go on until it waits, or ends."""
+        try:
+            step = move()
+            while isinstance(step, self._kind.Feedback):
+                message = self._kind.Impl.FeedbackMessage(feedback=step)
+                message.goal_id.uuid = list(goal.uuid)
+                self._publish("feedback", message)
+                step = next(goal.steps)
+        except StopIteration as end:
+            self._end(
+                goal, GoalState.CANCELED if goal.status is GoalState.CANCELING else GoalState.SUCCEEDED, end.value
+            )
+        except GoalCanceled as end:
+            self._end(goal, GoalState.CANCELED, end.result)
+        except GoalAborted as end:
+            self._end(goal, GoalState.ABORTED, end.result)
+        else:
+            if not isinstance(step, (int, float)) or isinstance(step, bool) or step < 0:
+                raise TypeError(f"{self.name}: expected seconds, or a {self.type} feedback, as a step, found {step!r}")
+            goal.wake_ns = now.t_ns + round(step * NS_PER_S)
+            if goal.wake_ns == now.t_ns:
+                self._go_on(goal, now, lambda: next(goal.steps))
+
+    def _end(self, goal: _Goal, status: GoalState, result: Any) -> None:
+        result = self._kind.Result() if result is None else result
+        if not isinstance(result, self._kind.Result):
+            found = type(result).__name__
+            raise TypeError(f"{self.name}: expected a result of {self.type}, found {found}")
+        goal.status, goal.wake_ns, goal.result = status, None, plain_fields(result)
+        self._tell_status()
+        asked, goal.asked = goal.asked, []
+        for number in asked:
+            self._ask_for_result(number, goal.uuid)
+
+    def _ask_for_result(self, number: int, uuid: tuple[int, ...]) -> None:
+        goal = self._goals.get(uuid)
+        if goal is None:
+            self._does.append(("get_result", number, {"status": int(GoalState.UNKNOWN)}))
+        elif goal.wake_ns is None:
+            self._does.append(("get_result", number, {"status": int(goal.status), "result": goal.result}))
+        else:
+            goal.asked.append(number)
+
+    def _cancel(self, now: Moment, number: int, info: Mapping[str, Any]) -> None:
+        """Cancel the goal of an id, those until a time, or all: as the service of an action says."""
+        uuid = tuple(info["goal_id"]["uuid"])
+        until_ns = info["stamp"]["sec"] * NS_PER_S + info["stamp"]["nanosec"]
+        named = any(uuid)
+        found = [
+            one
+            for one in self._goals.values()
+            if (named and one.uuid == uuid) or (until_ns and one.stamp_ns <= until_ns) or not (named or until_ns)
+        ]
+        going = [one for one in found if one.wake_ns is not None]
+        code = CANCELING if going or not named else ENDED if found else UNKNOWN_GOAL
+        infos = [_info(one) for one in going]
+        self._does.append(("cancel_goal", number, {"return_code": code, "goals_canceling": infos}))
+        for goal in going:
+            goal.status = GoalState.CANCELING
+        if going:
+            self._tell_status()
+        for goal in going:
+            self._go_on(goal, now, lambda one=goal: one.steps.throw(GoalCanceled()))  # type: ignore[misc]
+
+    def _tell_status(self) -> None:
+        known = [{"goal_info": _info(one), "status": int(one.status)} for one in self._goals.values()]
+        self._publish("status", built(message_class(STATUS_TYPE), {"status_list": known}, self.name))
+
+    def _publish(self, topic: str, message: Any) -> None:
+        self._does.append((topic, 0, base64.b64encode(bytes_of(message)).decode()))
+
+
+def _info(goal: _Goal) -> dict[str, Any]:
+    """Return the fields of a goal's action_msgs/msg/GoalInfo."""
+    return {"goal_id": {"uuid": list(goal.uuid)}, "stamp": _time(goal.stamp_ns)}
+
+
+def _time(t_ns: int) -> dict[str, int]:
+    return {"sec": t_ns // NS_PER_S, "nanosec": t_ns % NS_PER_S}
