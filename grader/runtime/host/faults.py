@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from types import FrameType, TracebackType
 
-from .protocol import FRAMES, ReportedFault
+from .protocol import FRAMES, FaultReport
 
 #: Maximum length of a fault's text.
 TEXT_CHARACTERS = 500
@@ -45,19 +45,19 @@ class Describer:
         """Name files below the share folders of a prefix as those of a submission: by package and path."""
         self._folders = (*self._folders, os.path.join(prefix, "share", ""))
 
-    def exception(self, error: BaseException) -> ReportedFault:
+    def exception(self, error: BaseException) -> FaultReport:
         """Convert an uncaught exception to a fault; of a chain, the first one that the program did not expect."""
         error = self._first(error)
         failed = graders_place(error, self._inside)
         if failed is not None:
             module, line = failed
-            return ReportedFault(GRADERS, _name_of(type(error)), module=module, at=line)
+            return FaultReport(GRADERS, _name_of(type(error)), module=module, at=line)
         if isinstance(error, SyntaxError) and self._is_of_file(error):
             return self.syntax_error(error)
         frames = [(f.f_code.co_filename, line, f.f_code.co_name) for f, line in traceback.walk_tb(error.__traceback__)]
         kind = _name_of(type(error))
         message = error.msg if isinstance(error, SyntaxError) else self.one_line(error)
-        return self._placed(ReportedFault("exception", kind, _behind(kind, message)), frames)
+        return self._placed(FaultReport("exception", kind, _behind(kind, message)), frames)
 
     def _first(self, error: BaseException) -> BaseException:
         """Return the exception that began a chain.
@@ -101,22 +101,22 @@ class Describer:
             return type(error.lineno) in (int, type(None))
         return False
 
-    def syntax_error(self, error: SyntaxError) -> ReportedFault:
+    def syntax_error(self, error: SyntaxError) -> FaultReport:
         """Convert the error of a file that cannot be compiled to a fault."""
         file = os.path.realpath(error.filename or "")
         message = str(error.msg)[:TEXT_CHARACTERS]
         kind, line = type(error).__name__, error.lineno or 0
-        return ReportedFault("syntax_error", kind, message, file=self._relative(file), line=line)
+        return FaultReport("syntax_error", kind, message, file=self._relative(file), line=line)
 
-    def stack(self, frame: FrameType | None, code: str) -> ReportedFault:
+    def stack(self, frame: FrameType | None, code: str) -> FaultReport:
         """Return a fault with the current stack of a thread."""
         frames = []
         while frame is not None:
             frames.append((frame.f_code.co_filename, frame.f_lineno, frame.f_code.co_name))
             frame = frame.f_back
-        return self._placed(ReportedFault(code), frames[::-1])
+        return self._placed(FaultReport(code), frames[::-1])
 
-    def _placed(self, fault: ReportedFault, frames: list[tuple[str, int, str]]) -> ReportedFault:
+    def _placed(self, fault: FaultReport, frames: list[tuple[str, int, str]]) -> FaultReport:
         """Return a fault with the student's own of some frames, outermost first."""
         own = [(self._relative(file), line, name) for file, line, name in frames if self._inside(file)]
         file, line, _ = own[-1] if own else ("", 0, "")

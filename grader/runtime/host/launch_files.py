@@ -24,7 +24,7 @@ from typing import Any
 
 from . import launch_names
 from .launch_shares import Shares
-from .protocol import LaunchedNode, LeftOut
+from .protocol import LaunchedNode, NotEvaluated
 
 #: The deepest nesting of included launch files.
 DEEPEST = 20
@@ -50,7 +50,7 @@ class LeftOutError(BaseException):
 
     def __init__(self, code: str, name: str = "", text: str = "") -> None:
         super().__init__(code)
-        self.told = LeftOut(code, name[:MOST_CHARACTERS], text[:MOST_CHARACTERS])
+        self.told = NotEvaluated(code, name[:MOST_CHARACTERS], text[:MOST_CHARACTERS])
         self.place = _written_at()
 
 
@@ -76,7 +76,7 @@ class Context:
         self.files: list[str] = []
         self.delay_s = 0.0
         self.nodes: list[LaunchedNode] = []
-        self.left_out: list[LeftOut] = []
+        self.left_out: list[NotEvaluated] = []
 
     def perform_substitution(self, value: Any) -> str:
         """Return the text of a substitution."""
@@ -1243,7 +1243,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
     prefix: str = "",
     most_nodes: int,
     most_left_out: int,
-) -> tuple[list[LaunchedNode], list[LeftOut]]:
+) -> tuple[list[LaunchedNode], list[NotEvaluated]]:
     """Evaluate a launch file; raises whatever it raises.
 
     Args:

@@ -25,10 +25,10 @@ from rclpy.qos import (
 )
 
 from . import originals
-from .actions import HAS_SERVER, ActionEnd, Receiver, type_name
+from .action_ends import HAS_SERVER, ActionEnd, Receiver, type_name
 from .events import ALIVE, Events
 from .node_parts import context_of, declared_by, ends_of, full_name_of, handle_of, name_of, seen_by
-from .protocol import Claim, Counterparts, Qos
+from .protocol import Claim, Counterparts, EndQos
 
 #: Topics that every node has; they are not counted.
 BACKGROUND = frozenset({"/rosout", "/parameter_events"})
@@ -641,7 +641,7 @@ def asks_for_best(values: Iterable[Any]) -> bool:
     )
 
 
-def _qos(qos: Any, kind: str) -> Qos:
+def _qos(qos: Any, kind: str) -> EndQos:
     """Describe the QoS of a publisher or subscription, as far as it decides who is matched."""
     writes = kind == "publisher"
     # a service that asks for what is best gets the usual
@@ -652,7 +652,7 @@ def _qos(qos: Any, kind: str) -> Qos:
         reliable = writes
     if qos.durability in (DurabilityPolicy.SYSTEM_DEFAULT, DurabilityPolicy.UNKNOWN):
         latched = writes
-    return Qos(
+    return EndQos(
         reliable,
         latched,
         finite_ns(qos.deadline),

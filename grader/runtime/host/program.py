@@ -20,7 +20,7 @@ from . import closures, entry, launch_files, machine, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_events
-from .protocol import Exited, Go, Launched, Ready, ReportedFault, ThreadFault, Written
+from .protocol import Exited, FaultReport, FilesWritten, Go, LaunchReport, Ready, ThreadFault
 from .quick_imports import import_without_needless
 from .replaced import guard_methods, hide_frames, rename_functions, without_own_frames
 from .shadows import ROS_PARTS, Around
@@ -149,7 +149,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     flush()
     with contextlib.suppress(Exception):
         if found := written.files():
-            link.send(Written(found))
+            link.send(FilesWritten(found))
     link.send(ending)
     originals.exit_now(0)
 
@@ -207,9 +207,9 @@ def evaluate(request: dict[str, Any]) -> None:
         describer.hide(installed)
         folders = (root, own)
         nodes, left_out = launch_files.describe(folders, path, packages, arguments, prefix=installed, **told["most"])
-        found = Launched(nodes, left_out)
+        found = LaunchReport(nodes, left_out)
     except BaseException as error:  # whatever the launch file raises becomes a fault
-        found = Launched(fault=describer.exception(error))
+        found = LaunchReport(fault=describer.exception(error))
     flush()
     link.send(found)
     originals.exit_now(0)
@@ -218,7 +218,7 @@ def evaluate(request: dict[str, Any]) -> None:
 def make_time(clock: str, link: Link, describer: Describer) -> VirtualTime | WallTime:
     """Create the clock that a scenario runs on."""
 
-    def report(fault: ReportedFault) -> None:
+    def report(fault: FaultReport) -> None:
         link.send(ThreadFault(fault))
 
     if clock == "virtual":

@@ -6,7 +6,7 @@ the host's folder because a sandboxed process sees nothing else of the grader.
 
 The host believes the worker. The worker believes nothing: the program can write to the same socket. So `report_of`
 builds each report by the `checked` of its type: a field that is not what it should be is as if it had not been sent,
-and what is no report becomes `Unknown`. What a field says is not checked here where that takes the submission or the
+and what is no report becomes `NeverSent`. What a field says is not checked here where that takes the submission or the
 plan: that a file has a line, or that a limit explains an end.
 
 A new field is written here, and where it is set and read.
@@ -56,7 +56,7 @@ def counts(data: Any) -> Mapping[str, int]:
 # ------------------------------------------------------------------------------------------------------------- claims
 
 
-class Qos(NamedTuple):
+class EndQos(NamedTuple):
     """The QoS that decides who is matched: what a writer offers, or what a reader asks for."""
 
     reliable: bool
@@ -66,7 +66,7 @@ class Qos(NamedTuple):
     lease_ns: int = 0  # of liveliness; 0 if there is none
 
     @classmethod
-    def checked(cls, data: Any) -> "Qos | None":
+    def checked(cls, data: Any) -> "EndQos | None":
         """Return what a process reports; None if it is not complete."""
         if not isinstance(data, dict):
             return None
@@ -80,7 +80,7 @@ class Qos(NamedTuple):
 
 
 #: The QoS of an end that asks for nothing special.
-ORDINARY = Qos(reliable=True, latched=False, deadline_ns=0, manual=False)
+ORDINARY = EndQos(reliable=True, latched=False, deadline_ns=0, manual=False)
 
 
 class Claim(NamedTuple):
@@ -90,9 +90,9 @@ class Claim(NamedTuple):
     name: str  # absolute; of a parameter `NODE:PARAMETER`
     type: str  # the ROS type; empty for a node, the value of a parameter as text
     number: int = 0  # of a publisher or subscription, from 1: tells those of one topic apart; 0 if it has none
-    qos: Qos = ORDINARY  # of a publisher or a subscription
-    sends: Qos = ORDINARY  # with which a client or a server sends
-    takes: Qos = ORDINARY  # and with which it receives
+    qos: EndQos = ORDINARY  # of a publisher or a subscription
+    sends: EndQos = ORDINARY  # with which a client or a server sends
+    takes: EndQos = ORDINARY  # and with which it receives
 
     @classmethod
     def checked(cls, data: Any) -> "Claim | None":
@@ -107,7 +107,9 @@ class Claim(NamedTuple):
         if kind in ("node", "parameter"):
             return cls(kind, name, interface)
         number = data.get("number")
-        qos, sends, takes = (Qos.checked(data[key]) if key in data else ORDINARY for key in ("qos", "sends", "takes"))
+        qos, sends, takes = (
+            EndQos.checked(data[key]) if key in data else ORDINARY for key in ("qos", "sends", "takes")
+        )
         if qos is None or sends is None or takes is None:
             return None
         return cls(kind, name, interface, number if isinstance(number, int) else 0, qos, sends, takes)
@@ -134,7 +136,7 @@ def _claims(data: Any, most: int | None = None) -> list[Claim | None] | None:
 FRAMES = 20
 
 
-class ReportedFault(NamedTuple):
+class FaultReport(NamedTuple):
     """What ended a program, or one of its threads: an uncaught exception, or that the watchdog gave it up."""
 
     code: str = ""  # `exception`, `syntax_error`, `faults.GRADERS`, or one of those of the watchdog
@@ -147,7 +149,7 @@ class ReportedFault(NamedTuple):
     frames: Sequence[tuple[str, int, str]] = ()  # the student's own: file, line, function; outermost first
 
     @classmethod
-    def checked(cls, data: Any) -> "ReportedFault":
+    def checked(cls, data: Any) -> "FaultReport":
         """Return what a process reports."""
         if not isinstance(data, dict):
             return cls()
@@ -247,7 +249,7 @@ class LaunchedNode(NamedTuple):
         )
 
 
-class LeftOut(NamedTuple):
+class NotEvaluated(NamedTuple):
     """Something in a launch file that is not evaluated; the worker has the words for each code."""
 
     code: str = ""  # a key of `notes._LEFT_OUT`
@@ -259,7 +261,7 @@ class LeftOut(NamedTuple):
     line: int = 0
 
     @classmethod
-    def checked(cls, data: Mapping[str, Any]) -> "LeftOut":
+    def checked(cls, data: Mapping[str, Any]) -> "NotEvaluated":
         """Return what a process reports."""
         return cls(
             _text(data.get("code")),
@@ -305,7 +307,7 @@ class Exited(NamedTuple):
 
     progress: Progress = Progress()
     code: int | None = None  # its exit code; None if the watchdog has ended it
-    fault: ReportedFault | None = None  # what ended it; None if it ended by itself
+    fault: FaultReport | None = None  # what ended it; None if it ended by itself
     left: bool = False  # whether its endpoints have left the graph before
     unsettled: str = ""  # why virtual time does not suit it: `threads`, `outside`; empty if nothing is known against it
 
@@ -315,17 +317,17 @@ class Exited(NamedTuple):
         return cls(
             Progress.checked(data),
             _number(data.get("code")),
-            ReportedFault.checked(data["fault"]) if isinstance(data.get("fault"), dict) else None,
+            FaultReport.checked(data["fault"]) if isinstance(data.get("fault"), dict) else None,
             bool(data.get("left")),
             _text(data.get("unsettled")),
         )
 
 
-class Arrived(NamedTuple):
+class MessagesArrived(NamedTuple):
     """In virtual time: what `Expect` or `Go` has announced has been received, or has not come in time."""
 
     @classmethod
-    def checked(cls, data: Mapping[str, Any]) -> "Arrived":
+    def checked(cls, data: Mapping[str, Any]) -> "MessagesArrived":
         """Return the report."""
         del data
         return cls()
@@ -382,12 +384,12 @@ MOST_HIDDEN = 20
 class ThreadFault(NamedTuple):
     """An exception has ended one of the program's threads, which goes on without it."""
 
-    fault: ReportedFault
+    fault: FaultReport
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> "ThreadFault":
         """Return what a process reports."""
-        return cls(ReportedFault.checked(data.get("fault")))
+        return cls(FaultReport.checked(data.get("fault")))
 
 
 class Reached(NamedTuple):
@@ -401,13 +403,13 @@ class Reached(NamedTuple):
         return cls(str(data.get("what")))
 
 
-class Written(NamedTuple):
+class FilesWritten(NamedTuple):
     """The small files that the program wrote, at its end; no report if there are none."""
 
     files: Sequence[WrittenContent] = ()
 
     @classmethod
-    def checked(cls, data: Mapping[str, Any]) -> "Written":
+    def checked(cls, data: Mapping[str, Any]) -> "FilesWritten":
         """Return what a process reports; whether it may have such names and contents is for the worker to see."""
         files = [one for one in _list(data.get("files"))[:MOST_WRITTEN] if isinstance(one, dict)]
         found = [(one.get("name"), one.get("content")) for one in files]
@@ -423,11 +425,11 @@ class EarlyMessage(NamedTuple):
     ended_ns: int  # and when it ended
 
     @classmethod
-    def checked(cls, data: Mapping[str, Any]) -> "EarlyMessage | Unknown":
+    def checked(cls, data: Mapping[str, Any]) -> "EarlyMessage | NeverSent":
         """Return what a process reports."""
         began_ns, ended_ns = data.get("began_ns"), data.get("ended_ns")
         if not (isinstance(began_ns, int) and isinstance(ended_ns, int)):
-            return Unknown()
+            return NeverSent()
         return cls(str(data.get("topic")), began_ns, ended_ns)
 
 
@@ -442,24 +444,24 @@ class Parameters(NamedTuple):
         return cls(_claims(data.get("claims")) or ())
 
 
-class Launched(NamedTuple):
+class LaunchReport(NamedTuple):
     """What a launch file describes: the only report of a process that evaluates one, after `Ready`."""
 
     nodes: Sequence[LaunchedNode] = ()
-    left_out: Sequence[LeftOut] = ()
-    fault: ReportedFault | None = None  # what ended the evaluation; there are no nodes then
+    left_out: Sequence[NotEvaluated] = ()
+    fault: FaultReport | None = None  # what ended the evaluation; there are no nodes then
 
     @classmethod
-    def checked(cls, data: Mapping[str, Any]) -> "Launched":
+    def checked(cls, data: Mapping[str, Any]) -> "LaunchReport":
         """Return what a process reports."""
         return cls(
             [LaunchedNode.checked(one) for one in _list(data.get("nodes")) if isinstance(one, dict)],
-            [LeftOut.checked(one) for one in _list(data.get("left_out")) if isinstance(one, dict)],
-            ReportedFault.checked(data["fault"]) if "fault" in data else None,
+            [NotEvaluated.checked(one) for one in _list(data.get("left_out")) if isinstance(one, dict)],
+            FaultReport.checked(data["fault"]) if "fault" in data else None,
         )
 
 
-class Unknown(NamedTuple):
+class NeverSent(NamedTuple):
     """What the host never sends, so that it comes from the program."""
 
 
@@ -467,16 +469,16 @@ Report: TypeAlias = (
     Ready
     | Idle
     | Exited
-    | Arrived
+    | MessagesArrived
     | Matched
     | Note
     | ThreadFault
     | Reached
-    | Written
+    | FilesWritten
     | EarlyMessage
     | Parameters
-    | Launched
-    | Unknown
+    | LaunchReport
+    | NeverSent
 )
 
 
@@ -534,20 +536,20 @@ Answer: TypeAlias = Go | Stop | Expect | AwaitMatches
 
 # ------------------------------------------------------------------------------------------------------- on the wire
 
-#: How each is called; a report of another kind is `Unknown`.
+#: How each is called; a report of another kind is `NeverSent`.
 _REPORTS: Mapping[Any, str] = {
     Ready: "ready",
     Idle: "idle",
     Exited: "exited",
-    Arrived: "arrived",
+    MessagesArrived: "arrived",
     Matched: "matched",
     Note: "note",
     ThreadFault: "fault",
     Reached: "reached",
-    Written: "written",
+    FilesWritten: "written",
     EarlyMessage: "early",
     Parameters: "parameters",
-    Launched: "launched",
+    LaunchReport: "launched",
 }
 _ANSWERS: Mapping[Any, str] = {Go: "go", Stop: "stop", Expect: "expect", AwaitMatches: "match"}
 _KINDS = {**_REPORTS, **_ANSWERS}
@@ -573,7 +575,7 @@ def checked(data: Mapping[str, Any]) -> Report:
     """Return what an object from a student's process reports."""
     kind = data.get("kind")
     check = _CHECKS.get(kind) if isinstance(kind, str) else None
-    return Unknown() if check is None else check(data)
+    return NeverSent() if check is None else check(data)
 
 
 def answer_of(line: bytes) -> Answer:

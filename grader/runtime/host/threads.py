@@ -20,7 +20,7 @@ from typing import Any
 from . import originals
 from .clock import VirtualClock
 from .outside import any_outside
-from .protocol import ReportedFault
+from .protocol import FaultReport
 from .replaced import as_builtin, without_own_frames
 from .scheduler import GreenThread, Scheduler
 
@@ -214,7 +214,7 @@ def install_locks(scheduler: Scheduler, clock: VirtualClock) -> None:
     concurrent.futures.thread._global_shutdown_lock = virtual()
 
 
-def report_threads(describe: Callable[[BaseException], ReportedFault], report: Callable[[ReportedFault], None]) -> None:
+def report_threads(describe: Callable[[BaseException], FaultReport], report: Callable[[FaultReport], None]) -> None:
     """Describe each exception that ends a thread, and report it once Python has printed it.
 
     The grader reads what was written whenever it hears of something: the other way round, chance would decide how much
@@ -239,8 +239,8 @@ def report_threads(describe: Callable[[BaseException], ReportedFault], report: C
 def install_threads(
     scheduler: Scheduler,
     clock: VirtualClock,
-    describe: Callable[[BaseException], ReportedFault],
-    report: Callable[[ReportedFault], None],
+    describe: Callable[[BaseException], FaultReport],
+    report: Callable[[FaultReport], None],
 ) -> None:
     """Make every thread that is started from now on a green thread, and joining one a virtual wait.
 

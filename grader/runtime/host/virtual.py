@@ -12,7 +12,7 @@ from . import originals, threads, times
 from .clock import VirtualClock
 from .link import Link
 from .order import ReadyOrder
-from .protocol import Answer, Arrived, AwaitMatches, Expect, Go, Idle, Matched, Progress, ReportedFault, Stop
+from .protocol import Answer, AwaitMatches, Expect, FaultReport, Go, Idle, Matched, MessagesArrived, Progress, Stop
 from .replaced import as_builtin
 from .scheduler import GreenThread, Scheduler
 
@@ -98,9 +98,7 @@ class VirtualTime:
         #: Called with a reason before the program waits for something outside of virtual time.
         self.give_up_outside: Callable[[str], None] = lambda reason: None
 
-    def install(
-        self, describe: Callable[[BaseException], ReportedFault], report: Callable[[ReportedFault], None]
-    ) -> None:
+    def install(self, describe: Callable[[BaseException], FaultReport], report: Callable[[FaultReport], None]) -> None:
         """Make the threads, locks, selectors and clocks of this process virtual.
 
         Args:
@@ -303,7 +301,7 @@ class VirtualTime:
             began_s = self._real.perf_counter()
             self._ledger.expect(answer.arrivals)
             if self._real.perf_counter() - began_s > QUICK_S:  # until then, the grader counts it as the program's work
-                self._link.send(Arrived())
+                self._link.send(MessagesArrived())
         if self._work is not None:  # what was done at this instant is still to be counted
             self._work.restart(FREE_NS if self.clock.now_ns > before_ns else -done_ns)
         if answer.interrupt:
@@ -316,12 +314,12 @@ class VirtualTime:
             answer = self._link.ask(self._waited(answer))
         return answer
 
-    def _waited(self, answer: Expect | AwaitMatches) -> Arrived | Matched:
+    def _waited(self, answer: Expect | AwaitMatches) -> MessagesArrived | Matched:
         """Wait as the grader says, and report it."""
         assert self._ledger is not None  # who has no endpoints is never told to wait
         if isinstance(answer, Expect):
             self._ledger.expect(answer.arrivals)
-            return Arrived()
+            return MessagesArrived()
         missing = self._ledger.await_matches(answer.expected, answer.wait_s)
         self._ledger.await_absence(answer.gone, answer.wait_s)
         return Matched(missing, self._ledger.await_events(answer.expected, answer.wait_s))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from grader.runtime.host.packages import PackageLayout, layout_of
-from grader.runtime.host.protocol import Exited, ReportedFault
+from grader.runtime.host.protocol import Exited, FaultReport
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.submission import ReadProgram
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, GraphSnapshot, Mark, Start, StartWay, Trace
@@ -37,7 +37,7 @@ def trace_without_run(plan: Plan, programs: Mapping[str, ReadProgram]) -> Trace 
         found, start_ns = programs.get(file, _UNKNOWN), starts_ns.get(name, 0)
         if found.error is not None:
             error = found.error
-            told = ReportedFault("syntax_error", error.type, error.message, file=file, line=error.line or 0)
+            told = FaultReport("syntax_error", error.type, error.message, file=file, line=error.line or 0)
             ends.append(reported_fault(name, start_ns, told, plan.limits, places))
         elif found.inert and not start_ns and _is_script(plan, name, file):
             starts.append(Start(name, file, StartWay.SCRIPT, arguments=plan.start_of(name).words))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from grader.runtime.host.protocol import Claim, Qos
+from grader.runtime.host.protocol import Claim, EndQos
 from grader.runtime.model.trace import keeps_within
 
 #: Prefixes of the types of services that every node has.
@@ -32,7 +32,7 @@ def ends_of(claims: Iterable[Claim], kind: str, name: str) -> list[Claim]:
 ORDINARY_END = Claim("", "", "")
 
 
-def fits(offer: Qos, wish: Qos) -> bool:
+def fits(offer: EndQos, wish: EndQos) -> bool:
     """Return whether the QoS that a writer offers satisfies that of a reader: the policies of `unmet_policy`."""
     return (
         (offer.reliable or not wish.reliable)

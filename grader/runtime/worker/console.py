@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 
-from grader.runtime.host.protocol import ReportedFault
+from grader.runtime.host.protocol import FaultReport
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import LogRecord, OutputLine
 
@@ -85,7 +85,7 @@ def _published(candidates: list[tuple[int, Logged]], first: str) -> tuple[int, L
     return None
 
 
-def last_traceback(text: str, root: str) -> ReportedFault | None:
+def last_traceback(text: str, root: str) -> FaultReport | None:
     """Find the exception that ended a process in the end of its output; None if there is no traceback.
 
     Args:
@@ -103,7 +103,7 @@ def last_traceback(text: str, root: str) -> ReportedFault | None:
     return described(lines, root) if syntax else None
 
 
-def thread_tracebacks(lines: Sequence[str], root: str) -> dict[int, ReportedFault]:
+def thread_tracebacks(lines: Sequence[str], root: str) -> dict[int, FaultReport]:
     """Find the exceptions that ended threads, keyed by the index of their first line."""
     found = {}
     for number, line in enumerate(lines):
@@ -112,7 +112,7 @@ def thread_tracebacks(lines: Sequence[str], root: str) -> dict[int, ReportedFaul
     return found
 
 
-def described(lines: Sequence[str], root: str) -> ReportedFault:
+def described(lines: Sequence[str], root: str) -> FaultReport:
     """Convert a traceback to a fault, in the format in which the host reports faults."""
     places = [match for line in lines if (match := _FRAME.fullmatch(line))]
     own = [
@@ -125,7 +125,7 @@ def described(lines: Sequence[str], root: str) -> ReportedFault:
     file, number, _ = own[-1] if own else ("", 0, "")
     type_, _, message = last.replace(f"{root}/", "").partition(": ")
     frames = [frame for frame in own if frame[2]]
-    return ReportedFault(code, type_, message, file=file, line=number, frames=frames)
+    return FaultReport(code, type_, message, file=file, line=number, frames=frames)
 
 
 def _is_in_thread(lines: Sequence[str], number: int) -> bool:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 
 from grader.runtime.host.faults import GRADERS, TEXT_CHARACTERS
-from grader.runtime.host.protocol import FRAMES, Exited, ReportedFault
+from grader.runtime.host.protocol import FRAMES, Exited, FaultReport
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import duration, size
 from grader.runtime.model.trace import Fault, FaultKind, Mark
@@ -51,7 +51,7 @@ STOPPED_CODE = 130
 NORMAL_AT_STOP = ("ExternalShutdownException", "rcl_shutdown already called", "KeyboardInterrupt")
 
 
-def reported_fault(process: str, t_ns: int, told: ReportedFault, limits: Limits, places: Places) -> Fault:
+def reported_fault(process: str, t_ns: int, told: FaultReport, limits: Limits, places: Places) -> Fault:
     """Convert a reported fault; an error that a limit caused names the limit.
 
     Args:
@@ -82,7 +82,7 @@ def reported_fault(process: str, t_ns: int, told: ReportedFault, limits: Limits,
     )
 
 
-def graders_fault(process: str, told: ReportedFault | None) -> str:
+def graders_fault(process: str, told: FaultReport | None) -> str:
     """Describe a reported fault of the grader's own code in a process, for a bug report; empty if it is another one."""
     if told is None or told.code != GRADERS:
         return ""
@@ -93,14 +93,14 @@ def graders_fault(process: str, told: ReportedFault | None) -> str:
     return f"the grader's own code failed in the process of {process}: {what}{where}; please report this line"
 
 
-def _own_words(told: ReportedFault) -> str:
+def _own_words(told: FaultReport) -> str:
     """Format an exception as Python does: `Type: message`, on one line."""
     name = told.type if _TYPE.fullmatch(told.type) else "Exception"
     message = " ".join(told.message[:TEXT_CHARACTERS].split())
     return (f"{name}: {message}" if message else name)[:TEXT_CHARACTERS]
 
 
-def _place(told: ReportedFault, places: Places, kind: FaultKind) -> tuple[str, int]:
+def _place(told: FaultReport, places: Places, kind: FaultKind) -> tuple[str, int]:
     """Return file and line of a fault if the submission has them; otherwise an empty string and 0."""
     file, line = told.file, told.line
     if not places.has(file):
@@ -110,7 +110,7 @@ def _place(told: ReportedFault, places: Places, kind: FaultKind) -> tuple[str, i
     return (file, line) if places.has(file, line) else (file, 0)
 
 
-def _frames(told: ReportedFault, places: Places) -> tuple[str, ...]:
+def _frames(told: FaultReport, places: Places) -> tuple[str, ...]:
     return tuple(
         f"{file}:{line} in {name}"
         for file, line, name in told.frames[:FRAMES]

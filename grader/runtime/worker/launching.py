@@ -13,7 +13,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-from grader.runtime.host.protocol import Go, Launched, LaunchedNode, LeftOut
+from grader.runtime.host.protocol import Go, LaunchedNode, LaunchReport, NotEvaluated
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import MOST_LAUNCHED, MOST_LEFT_OUT
 from grader.runtime.model.quantities import NS_PER_S
@@ -152,7 +152,7 @@ def _evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
 _ENDED = "ended while it was evaluated, before it described anything"
 
 
-def _description(student: NodeProcess) -> tuple[Launched | None, str]:
+def _description(student: NodeProcess) -> tuple[LaunchReport | None, str]:
     """Return the report, or None and why there is none."""
     student.tell(Go())
     started = time.monotonic()
@@ -160,7 +160,7 @@ def _description(student: NodeProcess) -> tuple[Launched | None, str]:
         for report in student.reports():
             if report is None:
                 return None, student.stopped
-            if isinstance(report, Launched):
+            if isinstance(report, LaunchReport):
                 return report, ""
         # What it writes is read, because a full pipe would block it.
         student.drain()
@@ -176,7 +176,7 @@ def _description(student: NodeProcess) -> tuple[Launched | None, str]:
         time.sleep(LOOK_S)
 
 
-def _launched(name: str, report: Launched, plan: Plan, places: Places) -> EvaluatedLaunch:
+def _launched(name: str, report: LaunchReport, plan: Plan, places: Places) -> EvaluatedLaunch:
     root, known = Path(plan.root), dict(plan.start_of(name).known)
     left_out, unstarted, notes = _not_done(name, report, places)
     ignored = ignored_packages(root) if plan.projects else {}
@@ -224,7 +224,7 @@ def _launched(name: str, report: Launched, plan: Plan, places: Places) -> Evalua
     return replace(made, left_out=tuple(left_out), unstarted=tuple(unstarted), notes=tuple(notes))
 
 
-def _not_done(name: str, report: Launched, places: Places) -> tuple[list[str], list[tuple[str, str]], list[str]]:
+def _not_done(name: str, report: LaunchReport, places: Places) -> tuple[list[str], list[tuple[str, str]], list[str]]:
     """Return what a launch file does that the grader does not, as in `left_out`, `unstarted` and `notes`."""
     left_out: list[str] = []
     unstarted: list[tuple[str, str]] = []
@@ -302,7 +302,7 @@ def _not_found(package: str, wanted: str, found: Executable | None, known: Seque
     return f"{text}; its executables are {names}" if names else f"{text}; it has no executables"
 
 
-def _command(one: LeftOut) -> list[str]:
+def _command(one: NotEvaluated) -> list[str]:
     """Return the words of a command that was left out; none for anything else, and where a shell may run more."""
     text = _text(one.text) if one.code == "command" else ""
     # A shell may run anything behind these characters, so that such a command counts as unknown.
@@ -323,11 +323,11 @@ def _only_name(words: Sequence[str]) -> str:
     return next((name if name.startswith("/") else f"/{name}" for name in named), "")
 
 
-def _left_out(name: str, one: LeftOut, places: Places) -> str:
+def _left_out(name: str, one: NotEvaluated, places: Places) -> str:
     return f"{_place(name, one, places)}: {left_out_sentence(one)}"
 
 
-def _place(name: str, one: LeftOut | LaunchedNode, places: Places) -> str:
+def _place(name: str, one: NotEvaluated | LaunchedNode, places: Places) -> str:
     file, line = one.file, one.line
     if places.has(file, line):
         return f"{file}:{line}"

@@ -8,7 +8,7 @@ import stat
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 
-from grader.runtime.host.protocol import LeftOut, Note
+from grader.runtime.host.protocol import Note, NotEvaluated
 from grader.runtime.model.limits import MAX_FILE_BYTES, MOST_LAUNCHED
 from grader.runtime.model.trace import Start, StartWay, main_not_called
 
@@ -103,7 +103,7 @@ def quoted(text: str) -> str:
     return f'"{plain[: _QUOTED_CHARACTERS - 1]}…"' if len(plain) > _QUOTED_CHARACTERS else f'"{plain}"'
 
 
-def left_out_words(told: LeftOut) -> str:
+def left_out_words(told: NotEvaluated) -> str:
     """Return the words for something of a launch file that is not evaluated.
 
     Args:
@@ -114,7 +114,7 @@ def left_out_words(told: LeftOut) -> str:
     return words.format(name=name, text=quoted(told.text))
 
 
-def left_out_sentence(told: LeftOut) -> str:
+def left_out_sentence(told: NotEvaluated) -> str:
     """Return what `left_out_words` says as a sentence, with the reason."""
     why, words = _WHY.get(told.code), left_out_words(told)
     if told.code == "nodes" and 1 < told.times < MOST_COUNTED:

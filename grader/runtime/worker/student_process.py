@@ -19,13 +19,13 @@ from grader.runtime.host.protocol import (
     MOST_WRITTEN,
     Answer,
     Exited,
-    Launched,
+    FilesWritten,
+    LaunchReport,
     Note,
     Reached,
     Ready,
     Report,
     ThreadFault,
-    Written,
     WrittenContent,
     line_of,
     report_of,
@@ -246,7 +246,7 @@ class NodeProcess(Process):
             self.reached.append(report.what[:NAME_CHARACTERS])
             return True
         # Once, at its end; more of them come from the program.
-        if isinstance(report, Written) and not self.written:
+        if isinstance(report, FilesWritten) and not self.written:
             self.written = written_files(self.name, report.files)
             return True
         return False
@@ -288,7 +288,7 @@ class NodeProcess(Process):
     def _parsed_report(self) -> Report | None:
         line, _, self._pending = self._pending.partition(b"\n")
         report = report_of(line)
-        if isinstance(report, (Exited, ThreadFault, Launched)):
+        if isinstance(report, (Exited, ThreadFault, LaunchReport)):
             self.grader_failed = self.grader_failed or graders_fault(self.name, report.fault)
         return report
 

@@ -7,7 +7,17 @@ from contextlib import nullcontext
 from dataclasses import replace
 
 from grader.runtime.host.originals import wait_until
-from grader.runtime.host.protocol import MOST_CLAIMS, Arrived, Exited, Expect, Go, Idle, Note, Progress, ThreadFault
+from grader.runtime.host.protocol import (
+    MOST_CLAIMS,
+    Exited,
+    Expect,
+    Go,
+    Idle,
+    MessagesArrived,
+    Note,
+    Progress,
+    ThreadFault,
+)
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Mark, Observation
 from grader.runtime.patience import Wait
@@ -144,7 +154,7 @@ class VirtualRunner(Runner):
         began_ns = self._core.now_ns
         for _ in range(MOST_REPORTS):
             report = student.report()
-            if isinstance(report, Arrived):
+            if isinstance(report, MessagesArrived):
                 workload.arrived()
             elif isinstance(report, Note):
                 student.note(report)
@@ -275,7 +285,7 @@ class VirtualRunner(Runner):
         with nullcontext() if student.workload is None else student.workload.beside():
             student.tell(Expect(receive.arrivals))
             answer = student.report()
-        if not isinstance(answer, Arrived):
+        if not isinstance(answer, MessagesArrived):
             self._mark_dead(student)
 
     def _write_output(self, student: NodeProcess, *, final: bool) -> None:

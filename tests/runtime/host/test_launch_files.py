@@ -17,7 +17,7 @@ import pytest
 from grader.runtime.host import launch_names
 from grader.runtime.host.faults import Describer
 from grader.runtime.host.launch_files import describe, meant_by
-from grader.runtime.host.protocol import LaunchedNode, LeftOut
+from grader.runtime.host.protocol import LaunchedNode, NotEvaluated
 from grader.runtime.worker.notes import left_out_sentence, left_out_words
 
 IMPORTS = """
@@ -43,7 +43,7 @@ from launch_ros.events.lifecycle import ChangeState
 from launch_ros.utilities import make_namespace_absolute
 TALKER = dict(package="robot", executable="talker")
 """
-Described = tuple[list[LaunchedNode], list[LeftOut]]
+Described = tuple[list[LaunchedNode], list[NotEvaluated]]
 
 
 @pytest.fixture
@@ -628,7 +628,7 @@ def test_a_node_with_an_argument_that_is_left_out_is_left_out(
 )
 def test_what_is_left_out_has_its_reason(told: dict[str, Any], said: str) -> None:
     """As a sentence for notes."""
-    assert left_out_sentence(LeftOut.checked(told)).startswith(said)
+    assert left_out_sentence(NotEvaluated.checked(told)).startswith(said)
 
 
 def test_what_ends_the_evaluation_says_so(described: Callable[..., Described]) -> None:

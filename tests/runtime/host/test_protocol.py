@@ -14,31 +14,31 @@ from grader.runtime.host.protocol import (
     NO_COUNTERPARTS,
     ORDINARY,
     Answer,
-    Arrived,
     AwaitMatches,
     Claim,
     Counterparts,
     EarlyMessage,
+    EndQos,
     Exited,
     Expect,
+    FaultReport,
+    FilesWritten,
     Go,
     Idle,
-    Launched,
     LaunchedNode,
-    LeftOut,
+    LaunchReport,
     Matched,
+    MessagesArrived,
+    NeverSent,
     Note,
+    NotEvaluated,
     Parameters,
     Progress,
-    Qos,
     Reached,
     Ready,
     Report,
-    ReportedFault,
     Stop,
     ThreadFault,
-    Unknown,
-    Written,
     WrittenContent,
     answer_of,
     line_of,
@@ -76,7 +76,7 @@ def test_an_endpoint_without_a_possible_number_has_none(number: Any) -> None:
     assert Claim.checked({**CLAIM, "number": 7}) == KNOWN._replace(number=7)
 
 
-FAULT = ReportedFault("exception", "ValueError", "no", "ros.py", 7, "a.py", 3, (("a.py", 3, "main"),))
+FAULT = FaultReport("exception", "ValueError", "no", "ros.py", 7, "a.py", 3, (("a.py", 3, "main"),))
 PROGRESS = Progress(
     now_ns=5,
     paused=True,
@@ -87,24 +87,24 @@ PROGRESS = Progress(
     sent={"topic /x": 2},
     early={"topic /x": 1},
     lost={"request /s": 1},
-    endpoints=[KNOWN, Claim("client", "/s", "std_srvs/srv/Empty", sends=Qos(False, True, 5, True, 6))],
+    endpoints=[KNOWN, Claim("client", "/s", "std_srvs/srv/Empty", sends=EndQos(False, True, 5, True, 6))],
     sees_graph=True,
 )
 REPORTS: tuple[Report, ...] = (
     Ready("ab" * 16),
     Idle(PROGRESS, wake_ns=9, leaving=True),
     Exited(PROGRESS, 3, FAULT, left=True, unsettled="threads"),
-    Arrived(),
+    MessagesArrived(),
     Matched(["publisher /x"], ["subscription /y"]),
     Note("started", "main", "a", "main", ("b.py",), "Node", "/n", 7),
     ThreadFault(FAULT),
     Reached("os.fork"),
-    Written([WrittenContent("log.txt", "eA==")]),
+    FilesWritten([WrittenContent("log.txt", "eA==")]),
     EarlyMessage("/x", 5, 6),
     Parameters([Claim("parameter", "/n:rate", "1.0")]),
-    Launched(
+    LaunchReport(
         [LaunchedNode("robot", "robots", "talker", ["a"], ["-r"], [("x.yaml", "a: 1")], 2.5, "a.launch.py", 3)],
-        [LeftOut("command", "x", "ls", 2, True, "a.launch.py", 4)],
+        [NotEvaluated("command", "x", "ls", 2, True, "a.launch.py", 4)],
         FAULT,
     ),
 )
@@ -169,7 +169,7 @@ def test_a_line_without_an_object_says_nothing(line: bytes) -> None:
 @pytest.mark.parametrize("line", [b"{}", b'{"kind": "go"}', b'{"kind": ["idle"]}', b'{"kind": "early", "topic": "/x"}'])
 def test_an_object_that_the_host_never_sends_is_unknown(line: bytes) -> None:
     """Also one that a worker would send."""
-    assert isinstance(report_of(line), Unknown)
+    assert isinstance(report_of(line), NeverSent)
 
 
 #: Everything that is said, and every field of it: spelled as an attribute everywhere else.

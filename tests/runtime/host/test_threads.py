@@ -10,7 +10,7 @@ import pytest
 from staging_programs import play
 from thread_orders import IMPORTS, ORDERS
 
-from grader.runtime.host.protocol import ReportedFault
+from grader.runtime.host.protocol import FaultReport
 from grader.runtime.host.threads import report_threads
 
 
@@ -567,7 +567,7 @@ def test_a_thread_is_reported_once_its_exception_is_printed(monkeypatch: pytest.
     events: list[str] = []
     monkeypatch.setattr(threading, "excepthook", threading.excepthook)
     monkeypatch.setattr(threading, "__excepthook__", lambda args: events.append("printed"))
-    report_threads(lambda error: ReportedFault(message=str(error)), lambda fault: events.append(fault.message))
+    report_threads(lambda error: FaultReport(message=str(error)), lambda fault: events.append(fault.message))
     thread = threading.Thread(target=int, args=("x",))
     thread.start()
     thread.join()

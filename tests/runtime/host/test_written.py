@@ -14,7 +14,7 @@ from hostile import hostile, printed, record
 from mcap.reader import make_reader
 from tiers import more
 
-from grader.runtime.host.protocol import MOST_WRITTEN, Written
+from grader.runtime.host.protocol import MOST_WRITTEN, FilesWritten
 from grader.runtime.host.written import ALL_BYTES, FILE_BYTES
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB
@@ -172,7 +172,7 @@ def test_files_are_attachments_of_the_recording() -> None:
 
 def believed(files: object) -> tuple[WrittenFile, ...]:
     """Return the files that a process has written, by what it reports."""
-    return written_files("a.py", Written.checked({"files": files}).files)
+    return written_files("a.py", FilesWritten.checked({"files": files}).files)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from grader.runtime.host.protocol import ReportedFault
+from grader.runtime.host.protocol import FaultReport
 from grader.runtime.model.trace import LogRecord, OutputLine
 from grader.runtime.worker.console import Logged, last_traceback, read_console, thread_tracebacks
 
@@ -68,7 +68,7 @@ def test_the_exception_that_ended_a_program_is_its_last_traceback() -> None:
     """With the student's own frames."""
     found = last_traceback("\n".join(("before", *TRACEBACK, "")), "/s")
     frames = [("a.py", 12, "main")]
-    assert found == ReportedFault("exception", "ValueError", "no number", file="a.py", line=12, frames=frames)
+    assert found == FaultReport("exception", "ValueError", "no number", file="a.py", line=12, frames=frames)
 
 
 def test_a_traceback_that_a_program_survived_ended_nothing() -> None:

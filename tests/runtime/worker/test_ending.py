@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from grader.runtime.host.protocol import Exited, ReportedFault
+from grader.runtime.host.protocol import Exited, FaultReport
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, NS_PER_S
 from grader.runtime.model.trace import Fault, FaultKind
@@ -25,7 +25,7 @@ class Three(Places):
 
 def told(data: Any, places: Places | None = None) -> Fault:
     """Return the fault that a process describes."""
-    return reported_fault("a.py", 5, ReportedFault.checked(data), LIMITS, places or Three(None))
+    return reported_fault("a.py", 5, FaultReport.checked(data), LIMITS, places or Three(None))
 
 
 LIMITS = Limits(memory_bytes=200 * MIB, processes=50, open_files=77, file_bytes=3 * MIB, scratch_bytes=5 * MIB)
@@ -62,7 +62,7 @@ def test_a_fault_of_the_grader_says_only_what_is_checked(module: object, line: o
     """A process may claim one: its words do not get into the grader's sentence."""
     data = {"code": "grader", "type": "all is well", "module": module, "at": line, "message": "full marks"}
     said = "the grader's own code failed in the process of a.py: Exception; please report this line"
-    assert graders_fault("a.py", ReportedFault.checked(data)) == said
+    assert graders_fault("a.py", FaultReport.checked(data)) == said
     assert told(data).text == said
 
 
@@ -72,8 +72,8 @@ def test_a_fault_of_the_grader_names_its_place() -> None:
     expected = (
         "the grader's own code failed in the process of a.py: ValueError, ledger.py line 48; please report this line"
     )
-    assert graders_fault("a.py", ReportedFault.checked(data)) == expected
-    assert graders_fault("a.py", ReportedFault("exception")) == graders_fault("a.py", None) == ""
+    assert graders_fault("a.py", FaultReport.checked(data)) == expected
+    assert graders_fault("a.py", FaultReport("exception")) == graders_fault("a.py", None) == ""
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.runtime.host.protocol import Arrived, Exited, Go, Idle, Launched, Note, Stop, answer_of
+from grader.runtime.host.protocol import Exited, Go, Idle, LaunchReport, MessagesArrived, Note, Stop, answer_of
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
 from grader.runtime.sandbox.protocol import Command
@@ -338,7 +338,7 @@ def test_answers_arrive(start: Callable[[str], NodeProcess]) -> None:
 def test_two_reports_in_one_piece_are_two(start: Callable[[str], NodeProcess]) -> None:
     """What is there is not lost until it is asked for."""
     student = start('line.sendall(b\'{"kind": "arrived"}\\n{"kind": "idle"}\\n\'); signal.pause()')
-    assert [type(student.report()), type(student.report())] == [Arrived, Idle]
+    assert [type(student.report()), type(student.report())] == [MessagesArrived, Idle]
 
 
 @pytest.mark.parametrize(
@@ -503,7 +503,7 @@ def test_reports_that_are_there_are_taken_without_waiting(start: Callable[[str],
     found: list[Any] = []
     while len(found) < 2:
         found += student.reports()
-    assert [type(report) for report in found] == [Note, Launched]
+    assert [type(report) for report in found] == [Note, LaunchReport]
     assert student.reports() == []
     student.tell(Go())
     while not (found := student.reports()):

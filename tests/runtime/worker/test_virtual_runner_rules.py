@@ -20,11 +20,11 @@ from grader.runtime.host.ledger import Ledger
 from grader.runtime.host.protocol import (
     NO_COUNTERPARTS,
     Answer,
-    Arrived,
     AwaitMatches,
     Counterparts,
     Expect,
     Go,
+    MessagesArrived,
     Report,
 )
 from grader.runtime.model.trace import GraphSnapshot, Message, OutputLine, Trace
@@ -58,7 +58,7 @@ class Student(ScriptedStudent):
     def report(self) -> Report | None:
         if getattr(self, "_receives", False):
             self._receives = False
-            return Arrived()
+            return MessagesArrived()
         return super().report()
 
 
