@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Generator, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -234,6 +235,7 @@ class ScriptedObserver:
         self._world = world
         self._watched: set[tuple[str, str]] = set()
         self.published: list[tuple[str, Any]] = []
+        self.unnamed: Counter[tuple[str, str, str]] = Counter()
         self.crowded = ""
         self.advertised: list[tuple[str, str, bool]] = []
         self.services: Any = None

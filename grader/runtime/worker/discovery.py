@@ -208,9 +208,12 @@ class Discovery:
         return told and all(found[key] >= count for key, count in wanted.items())
 
     def _surplus(self, claims: list[Claim]) -> Counter[Key]:
-        """Count the removed endpoints that are still in the graph, except known strangers."""
-        wanted = _wanted(claims)
-        return +Counter({key: self._found[key] - wanted[key] - self._strangers[key] for key in self._known})
+        """Count the removed endpoints that are still in the graph, except known strangers.
+
+        The name of a node that leaves may go before its endpoints, which programs count until they have gone as well.
+        """
+        wanted, there = _wanted(claims), self._found + self._observer.unnamed
+        return +Counter({key: there[key] - wanted[key] - self._strangers[key] for key in self._known})
 
     def _query(self, now_ns: int) -> None:
         """Look the graph up, and count in it the endpoints that any process has ever claimed.

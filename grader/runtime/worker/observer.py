@@ -68,6 +68,7 @@ class Observer:
         limits: Sets the largest message whose content is read.
 
     Attributes:
+        unnamed: How many endpoints of the last graph have a node without a name, by kind, topic and type.
         crowded: Why not every topic can be read, as a phrase: one has more types than nodes could agree on. Empty
             otherwise.
     """
@@ -87,6 +88,7 @@ class Observer:
         self.services = ServiceEnds(self.node)
         self._broken: Counter[str] = Counter()
         self._large: Counter[str] = Counter()
+        self.unnamed: Counter[tuple[str, str, str]] = Counter()
         self.crowded = ""
 
     def close(self) -> None:
@@ -141,7 +143,9 @@ class Observer:
             for info in asked(look, topic, nothing=nobody)
         ]
         # An endpoint without the name of its node is in the next snapshot with it, and would count as two here.
-        students = [e for e in ends if e.participant >= 0 and UNKNOWN_NODE not in e.node]
+        others = [e for e in ends if e.participant >= 0]
+        self.unnamed = Counter((e.kind, e.topic, e.type) for e in others if UNKNOWN_NODE in e.node)
+        students = [e for e in others if UNKNOWN_NODE not in e.node]
         return GraphSnapshot(t_ns, tuple(nodes), tuple(sorted(students, key=_endpoint_order)), offered)
 
     def with_qos(self, graph: GraphSnapshot) -> GraphSnapshot:

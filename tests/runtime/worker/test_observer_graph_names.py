@@ -46,6 +46,7 @@ def test_an_endpoint_whose_node_has_no_name_yet_is_not_there_yet() -> None:
     graph = seen.graph(0)
     assert [e.node for e in graph.endpoints] == ["/fan_controller"]
     assert graph.nodes == ("/fan_controller",)
+    assert seen.unnamed == {("publisher", "/fan_speed", "std_msgs/msg/Float32"): 1}
 
 
 def test_an_endpoint_is_there_as_soon_as_its_node_has_a_name() -> None:
