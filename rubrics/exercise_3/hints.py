@@ -8,13 +8,17 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from grader.api import (
-    EXACT,
-    AnswerFacts,
-    AnswerRow,
     Case,
     Clue,
     Outcome,
     ProblemKind,
+    hint_rule,
+    published,
+    published_numbers,
+    within,
+)
+from grader.api.unstable import (
+    EXACT,
     Source,
     Switch,
     chain,
@@ -23,7 +27,6 @@ from grader.api import (
     draws,
     first_line,
     given_leaf,
-    hint_rule,
     is_flag,
     last_name,
     made,
@@ -33,8 +36,6 @@ from grader.api import (
     number_in_code,
     pauses,
     publish_calls,
-    published,
-    published_numbers,
     received,
     runs,
     silent_topic,
@@ -43,7 +44,6 @@ from grader.api import (
     text_comparisons,
     text_of,
     timer_code,
-    within,
 )
 
 #: The checks that are explained here.
@@ -83,8 +83,7 @@ def _subscribers(case: Case) -> Iterator[_Subscriber]:
 
 def _late(case: Case) -> _Subscriber | None:
     """Return the controller, if its answers are late."""
-    facts = case.found(AnswerFacts)
-    return next(_subscribers(case), None) if facts is not None and facts.late else None
+    return next(_subscribers(case), None) if getattr(case.facts, "late", False) else None
 
 
 def _compared(case: Case) -> Iterator[tuple[Source, ast.Compare]]:
@@ -101,9 +100,9 @@ def _controller(case: Case) -> _Controller | None:
     return _Controller(case, owners[0], check) if len(owners) == 1 else None
 
 
-def _rows(case: Case) -> tuple[AnswerRow, ...]:
-    facts = case.found(AnswerFacts)
-    return () if facts is None else facts.rows
+def _rows(case: Case) -> tuple[Any, ...]:
+    """Return the inputs with the answers to them, if the check tells them: each an `AnswerRow` of `checks.py`."""
+    return getattr(case.facts, "rows", ())
 
 
 def _wrong_inputs(case: Case) -> list[float]:

@@ -5,21 +5,15 @@ from __future__ import annotations
 import ast
 from dataclasses import dataclass
 
-from grader.api import (
-    Case,
-    Clue,
+from grader.api import Case, Clue, LogRecord, Outcome, ProblemKind, calls_of, hint_rule
+from grader.api.unstable import (
     Function,
-    LogRecord,
-    Outcome,
-    ProblemKind,
     Source,
     Switch,
     argument,
-    calls_of,
     chain,
     first_line,
     given_leaf,
-    hint_rule,
     is_log,
     last_name,
     number,

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import islice
-from typing import Any, Protocol
+from typing import Any
 
 from grader.grading.judging.charts import (
     MOST_CASES,
@@ -36,7 +36,7 @@ from grader.grading.judging.values import (
 )
 from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Series, Stretch, Tone
 from grader.grading.model.exercise import NODE_GRAPH, has, named, roles_of
-from grader.grading.model.wording import in_unit, listed, number, quote
+from grader.grading.model.wording import listed, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, counted, seconds
@@ -585,30 +585,3 @@ def _part(value: Mapping[str, object], name: str) -> Mapping[str, object]:
 def said_of(value: Mapping[str, object]) -> str:
     """Return the content of a message as text: `order = 3, name = 'a'`."""
     return ", ".join(f"{quote(str(name), 40)} = {shown(inner)}" for name, inner in islice(value.items(), 12))
-
-
-class Switching(Protocol):
-    """A check on a controller that switches at a threshold."""
-
-    @property
-    def input(self) -> str:
-        """Topic of the numbers."""
-
-    @property
-    def output(self) -> str:
-        """Topic of the answers."""
-
-    @property
-    def threshold(self) -> float:
-        """Where the answer changes."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of the input."""
-
-
-def threshold_drawing(check: Switching, expected: Sequence[Reading]) -> Drawing:
-    """Return the inputs of a controller with its threshold, above its answers with the expected ones."""
-    level = Level(check.threshold, f"{number(check.threshold)}{in_unit(check.unit)}", name="threshold")
-    heard = Plot(check.input, levels=(level,), unit=check.unit)
-    return Drawing((heard, Plot(check.output, expected=tuple(expected))))

@@ -24,6 +24,7 @@ LONGEST_SOURCE = 100_000
 CODE_LENGTH = 70
 #: Where a node keeps its dotted name.
 _CHAIN = "_chain"
+#: A function of a student's file.
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Loop = ast.While | ast.For
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache, wraps
 from types import MappingProxyType
@@ -145,11 +145,6 @@ def _readings(messages: Iterable[Message | Delivery], field: str) -> tuple[Readi
     """Return the numbers of those messages that hold one."""
     found = ((m.t_ns, number_of(m, field)) for m in messages)
     return tuple(Reading(t_ns, value) for t_ns, value in found if value is not None)
-
-
-def last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
-    """Return one reading per instant: the last one."""
-    return tuple({r.t_ns: r for r in series}.values())
 
 
 @per_trace

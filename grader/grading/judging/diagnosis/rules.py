@@ -221,6 +221,7 @@ def is_asked(rule: Rule, case: Case) -> bool:
     )
 
 
+#: A decorator that makes a hint rule of a function.
 Maker = Callable[[Callable[[Given], Clue | None]], Rule]
 
 
