@@ -165,7 +165,7 @@ def test_the_members_of_a_check_are_declared_in_one_place() -> None:
     for path in (Path(grader.__file__).parent / "grading" / "judging").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             named = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
-            if named in ("getattr", "has") and isinstance(node, ast.Call):
+            if named in ("getattr", "has_member") and isinstance(node, ast.Call):
                 about = ast.unparse(node.args[0])
                 if re.fullmatch(r"(\w+\.)?check|kind", about) and isinstance(node.args[1], ast.Constant):
                     asked.add(str(node.args[1].value))

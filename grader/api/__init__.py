@@ -261,7 +261,7 @@ def grade(  # noqa: PLR0913  options of the command
         isolation=isolation,
     )
     writer = EvidenceWriter([Path(evidence)] if evidence is not None else [], request)
-    report = start.grade(request, _quiet, writer.remember)
+    report = start.grade_once(request, _quiet, writer.remember)
     writer.write(report)
     return report
 
@@ -286,7 +286,7 @@ def observe(
         GraderError: A program or the machine cannot be used; its class says who must act.
     """
     from grader.grading.app.observe import ObserveRequest  # noqa: PLC0415  takes long
-    from grader.grading.app.observe import observe as observed  # noqa: PLC0415
+    from grader.grading.app.observe import observe_programs as observed  # noqa: PLC0415
     from grader.runtime.model.quantities import nanoseconds  # noqa: PLC0415
 
     files, folders = tuple(map(Path, programs)), tuple(map(Path, interfaces))
@@ -307,7 +307,7 @@ def rejudge(evidence: str | Path, *, rubrics: Sequence[str | Path] = (), exercis
         RubricError: A rubric cannot be used.
     """
     from grader.grading.app.rejudge import judgement  # noqa: PLC0415  takes long
-    from grader.grading.app.rejudge import rejudge as judged_again  # noqa: PLC0415
+    from grader.grading.app.rejudge import rejudge_evidence as judged_again  # noqa: PLC0415
     from grader.grading.evidence.store import open_evidence  # noqa: PLC0415
 
     how = judgement(tuple(exercises), tuple(map(Path, rubrics)), pictures=True)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from grader.grading.judging.diagnosis.values import draws as draws
     from grader.grading.judging.diagnosis.wiring import Switch as Switch
     from grader.grading.judging.diagnosis.wiring import conditions as conditions
-    from grader.grading.judging.diagnosis.wiring import constant as constant
+    from grader.grading.judging.diagnosis.wiring import constant_value as constant_value
     from grader.grading.judging.diagnosis.wiring import given_leaf as given_leaf
     from grader.grading.judging.diagnosis.wiring import is_flag as is_flag
     from grader.grading.judging.diagnosis.wiring import is_log as is_log
@@ -64,9 +64,9 @@ if TYPE_CHECKING:
     from grader.grading.judging.source import chain as chain
     from grader.grading.judging.source import first_line as first_line
     from grader.grading.judging.source import last_name as last_name
+    from grader.grading.judging.source import literal_text as literal_text
     from grader.grading.judging.source import parameters as parameters
     from grader.grading.judging.source import subtree as subtree
-    from grader.grading.judging.source import text_of as text_of
     from grader.grading.judging.texts import Printed as Printed
     from grader.grading.judging.texts import clean as clean
     from grader.grading.judging.texts import printed_numbers as printed_numbers
@@ -94,11 +94,12 @@ if TYPE_CHECKING:
 CONTENTS: dict[str, dict[str, str]] = {
     "Source code": {
         "grader.grading.judging.source": (
-            "Source Function first_line last_name chain argument parameters text_of subtree"
+            "Source Function first_line last_name chain argument parameters literal_text subtree"
         ),
         "grader.grading.judging.diagnosis.wiring": (
-            "constant given_leaf made made_for roots reached runs names_in is_log publish_calls conditions is_flag "
-            "timer_code received message_classes number_in_code text_in_code Switch switches text_comparisons pauses"
+            "constant_value given_leaf made made_for roots reached runs names_in is_log publish_calls conditions "
+            "is_flag timer_code received message_classes number_in_code text_in_code Switch switches text_comparisons "
+            "pauses"
         ),
         "grader.grading.judging.diagnosis.values": "draws",
     },

@@ -108,10 +108,10 @@ def command(  # noqa: PLR0913  one parameter an option
     if similarity:
         require("--similarity", "copydetect", "similarity")
     from grader.course.classroom.class_run import ClassRequest, grade_class
-    from grader.course.classroom.outputs import platforms, render_summary, summary_json
-    from grader.course.classroom.schedulers import ThisMachine, opened
+    from grader.course.classroom.outputs import platforms, render_graded, summary_json
+    from grader.course.classroom.schedulers import ThisMachine, opened_scheduler
     from grader.course.classroom.watching import shown_watcher
-    from grader.course.similarity.finding import read_given
+    from grader.course.similarity.finding import read_templates
     from grader.grading.app.request import request_for
     from grader.runtime.shipped import shipped
 
@@ -140,16 +140,19 @@ def command(  # noqa: PLR0913  one parameter an option
         title=title,
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
-        given=read_given(templates or (shipped("student_template"),)) if similarity else None,
+        given=read_templates(templates or (shipped("student_template"),)) if similarity else None,
     )
     here = ctx.find_object(ThisMachine) or ThisMachine()
     try:
-        with opened(scheduler, jobs, complain, here) as make, shown_watcher(wanted=not no_progress) as watcher:
+        with (
+            opened_scheduler(scheduler, jobs, complain, here) as make,
+            shown_watcher(wanted=not no_progress) as watcher,
+        ):
             graded = grade_class(course, watcher, complain, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept; run the same command again to continue", err=True)
         return INTERRUPTED
-    print_result(lambda: summary_json(graded), lambda _: render_summary(graded), as_json=as_json)
+    print_result(lambda: summary_json(graded), lambda _: render_graded(graded), as_json=as_json)
     for mistake, rows in graded.book.author_mistakes.items():
         count = "1 submission" if len(rows) == 1 else f"{len(rows)} submissions"
         complain(f"the rubric has a mistake: {mistake} ({count})", kind="error")

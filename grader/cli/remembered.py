@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from grader.cli.options import complain
-from grader.grading.model.grading_options import BATCH, names
+from grader.grading.model.grading_options import BATCH, option_names
 
 if TYPE_CHECKING:
     from grader.course.classroom.last_run import LastRun
@@ -24,7 +24,7 @@ KEPT = (
     "pattern",
     "roster",
     "adjustments",
-    *names(BATCH),
+    *option_names(BATCH),
     "seed_key",
     "title",
     "standalone",

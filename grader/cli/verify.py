@@ -92,10 +92,10 @@ def command(  # noqa: PLR0913  one parameter an option
         lambda page: render_verification(found, width=page.width, colour=page.colour),
         as_json=as_json,
     )
-    return exit_code(found)
+    return verification_exit_code(found)
 
 
-def exit_code(found: Verification) -> int:
+def verification_exit_code(found: Verification) -> int:
     """Return the exit code of the command for its result."""
     from grader.grading.model.verification import ConditionState
 

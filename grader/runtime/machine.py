@@ -24,7 +24,7 @@ from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.bubblewrap import ENTERABLE
 from grader.runtime.sandbox.choose import Machine, inspect_tier, inspect_tiers, sandbox_memory
 from grader.runtime.sandbox.exposure import some_user
-from grader.runtime.sandbox.properties import SETTINGS_FOLDER, confined, install_command, setting_command
+from grader.runtime.sandbox.properties import SETTINGS_FOLDER, has_filter, package_command, setting_command
 from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
 from grader.runtime.supervisor.byte_code import byte_code
 from grader.runtime.supervisor.memory_groups import group_fact
@@ -180,7 +180,7 @@ def _fast_dds(ros: RosInstallation) -> str:
 def _bubblewrap() -> Fact:
     path = shutil.which("bwrap")
     if path is None:
-        return Fact("bubblewrap", "not installed", remedy=install_command("bubblewrap"))
+        return Fact("bubblewrap", "not installed", remedy=package_command("bubblewrap"))
     return Fact("bubblewrap", f"{_said_by(path).removeprefix('bubblewrap ')} ({path})")
 
 
@@ -202,7 +202,7 @@ def _distribution() -> str:
 def _surroundings() -> str:
     marks = {"/.dockerenv": "a Docker container", "/run/.containerenv": "a Podman container"}
     inside = next((name for path, name in marks.items() if Path(path).exists()), "")
-    filtered = "system calls filtered" if confined() else ""
+    filtered = "system calls filtered" if has_filter() else ""
     if os.environ.get("GITHUB_ACTIONS") == "true":
         inside = inside or "a GitHub Actions runner"
     known = ", ".join(part for part in (f"in {inside}" if inside else "", filtered) if part)
@@ -217,7 +217,7 @@ def namespaces(command: str, settings: Path = SETTINGS_FOLDER) -> Fact:
         settings: Where the kernel exposes its settings.
     """
     if not command:
-        filtered = ", but a filter of system calls may" if confined() else ""
+        filtered = ", but a filter of system calls may" if has_filter() else ""
         return Fact("user namespaces", f"no setting forbids them{filtered}")
     name, _, value = command.rpartition(" ")[2].partition("=")
     now = settings.joinpath(*name.split(".")).read_text(encoding="ascii").strip()

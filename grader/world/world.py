@@ -35,17 +35,17 @@ from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, r
 from grader.runtime.programs.executables import package_of
 from grader.runtime.serialization import (
     QoSProfile,
+    message_type_name,
     parameter_message,
     qos_words,
-    read,
+    read_message,
     serialized,
     service_type,
-    type_name,
     type_of_part,
 )
 from grader.runtime.session import RecordingSession, SteppedRun
 from grader.runtime.simulation import Moment, Simulation
-from grader.runtime.simulation.loading import made
+from grader.runtime.simulation.loading import made_simulation
 from grader.runtime.steps import (
     Advance,
     CallService,
@@ -488,10 +488,12 @@ class World:
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type, "srv")
+        interface = message_type_name(type, "srv")
         known = self._functions.get(name)
-        if known is not None and type_name(known[0]) != interface:
-            raise ValueError(f"{name}: expected {type_name(known[0])}, as it is served already, found {interface}")
+        if known is not None and message_type_name(known[0]) != interface:
+            raise ValueError(
+                f"{name}: expected {message_type_name(known[0])}, as it is served already, found {interface}"
+            )
         self._functions[name] = (service_type(interface), function)
         self._fits = False
         self._perform(Serve(name, interface))
@@ -614,7 +616,7 @@ class World:
         """
         __tracebackhide__ = True
         if isinstance(simulation, str):
-            simulation = made(simulation, "", b"", parameters)
+            simulation = made_simulation(simulation, "", b"", parameters)
         number = len(self._simulations)
         self._simulations.append(simulation)
         simulation.begin(Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
@@ -641,7 +643,7 @@ class World:
         known = self._read.setdefault(topic, [])
         found = self._messages.get(topic, ())
         if type is not None:
-            expected = type_name(type)
+            expected = message_type_name(type)
             other = next((one.type for one in found if one.type != expected), "")
             if other:
                 raise WrongType(f"{topic}: expected messages of type {expected}, found {other}")
@@ -674,7 +676,7 @@ class World:
         return telling.no_server(self._graph, service)
 
     def _as_object(self, message: Message) -> Any:
-        return read(message)
+        return read_message(message)
 
     def rate(self, topic: str, *, last: float | None = None) -> float:
         """Return how many messages a second programs publish on a topic, from the first to the last one.
@@ -890,7 +892,7 @@ class World:
         if self._fits:
             return
         self._fits = True
-        served = {name: type_name(kind) for name, (kind, _) in self._functions.items()}
+        served = {name: message_type_name(kind) for name, (kind, _) in self._functions.items()}
         of_test = telling.Sides(self._offers.values(), {}, served)
         for found in telling.mismatches(self._graph, [of_test, *map(telling.sides_of, self._simulations)]):
             if found not in self._mismatches:

@@ -16,6 +16,7 @@ from grader.api.unstable import (
     given_leaf,
     is_log,
     last_name,
+    literal_text,
     number,
     number_in_code,
     pauses,
@@ -24,7 +25,6 @@ from grader.api.unstable import (
     subtree,
     switches,
     text_comparisons,
-    text_of,
 )
 
 
@@ -178,9 +178,9 @@ def _with_decimals(source: Source, node: ast.expr) -> str:
         return code if isinstance(inner, ast.Call) and chain(inner.func) == "float" else f"float({code})"
     if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Call):
         call = node.value
-        cut = last_name(call.func) in ("split", "partition") and text_of(argument(call, 0, "sep")) == "."
+        cut = last_name(call.func) in ("split", "partition") and literal_text(argument(call, 0, "sep")) == "."
         return source.code(call.func.value, 40) if cut and isinstance(call.func, ast.Attribute) else ""
-    pattern = text_of(node)
+    pattern = literal_text(node)
     asked = source.parents.get(node)
     used = isinstance(asked, ast.Call) and source.resolved(asked.func).startswith("re.")
     digits = next((d for d in _DIGITS if pattern is not None and d in pattern), "")

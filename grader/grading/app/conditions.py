@@ -78,7 +78,7 @@ def surroundings() -> Surroundings:
 FIRST = VerifyCondition("first", "as grading records", variables={"PYTHONHASHSEED": HASH_SEEDS[0]})
 
 
-def conditions(names: Sequence[str], isolation: str, here: Surroundings) -> list[VerifyCondition]:
+def made_conditions(names: Sequence[str], isolation: str, here: Surroundings) -> list[VerifyCondition]:
     """Return the named conditions, in the order in which they are tried; all usual ones if none is named.
 
     Those that this machine or user cannot make say why. Testing the sandboxes may take some seconds.

@@ -18,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from grader.grading.app.grade import prepared
+from grader.grading.app.grade import prepared_run
 from grader.grading.app.request import request_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
@@ -94,7 +94,7 @@ def _recorded(session: RecordingSession, recordings: Recordings, number: int) ->
         json.loads(wanted.request), submission=wanted.path, seed=wanted.seed, rubrics=tuple(map(Path, wanted.rubrics))
     )
     try:
-        with prepared(session, request, lambda _: None, time.perf_counter()) as ready:
+        with prepared_run(session, request, lambda _: None, time.perf_counter()) as ready:
             keys = [key for key in ready.jobs if not wanted.scenarios or key in wanted.scenarios]
             jobs = {key: ready.jobs[key] for key in (reversed(keys) if recordings.reverses else keys)}
             traces = session.record(jobs, AUTO, lambda _: None, on_wall=False)

@@ -14,7 +14,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import IO, Any
 
-from grader.grading.app.conditions import FIRST, OTHER_FOLDER, VerifyCondition, conditions, own_home, surroundings
+from grader.grading.app.conditions import FIRST, OTHER_FOLDER, VerifyCondition, made_conditions, own_home, surroundings
 from grader.grading.app.grade import Progress, begun, read_exercises, wanted_files
 from grader.grading.app.recorded_again import Recordings, WantedRecording
 from grader.grading.app.request import GradeRequest, request_of, request_to_json
@@ -28,7 +28,7 @@ from grader.grading.submissions.submission import collect_submission, stage_coll
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, HarnessError
 from grader.runtime.model.trace import ClockKind, Trace
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.recording.codec import to_json
 from grader.runtime.recording.packed import trace_from_json
 
@@ -112,7 +112,7 @@ def verify(request: VerifyRequest, progress: Progress) -> Verification:
         first = [(Place(one.name, *key), each) for one in subjects for key, each in one.first.items()]
         tried = [] if evidence is None else [_compared_with_evidence(subjects)]
         progress("looking for conditions to record under")
-        wanted = conditions(request.conditions, isolation, surroundings())
+        wanted = made_conditions(request.conditions, isolation, surroundings())
         for number, condition in enumerate(wanted, 1):
             progress(f"recording {condition.words} ({number} of {len(wanted)})")
             tried.append(_tried(folder, subjects, condition, isolation, request.program))
@@ -146,8 +146,8 @@ def _subject(request: VerifyRequest, path: str, into: Path, evidence: Evidence |
     if every:
         exercises, submission = begun(exercises, submission)
     if evidence is not None and evidence.manifest.submission.digest != submission.digest:
-        where = shown(str(evidence.folder), 500)
-        text = f"{where}: expected evidence of {shown(path, 500)}, found that of other files"
+        where = printable(str(evidence.folder), 500)
+        text = f"{where}: expected evidence of {printable(path, 500)}, found that of other files"
         raise EvidenceError(text, "name the submission as it was graded, or other evidence")
     seed = how.seed_key.seed(submission.digest) if how.seed is None else how.seed
     asked = replace(
@@ -305,7 +305,7 @@ def _recorded(
         if program.wait() != 0:
             said.seek(0)
             words = said.read().strip().splitlines()
-            last = shown(words[-1], _MOST_CHARACTERS) if words else f"exit code {program.returncode}"
+            last = printable(words[-1], _MOST_CHARACTERS) if words else f"exit code {program.returncode}"
             yield {"problem": f"recording ended early: {last}", "hint": ""}
 
 

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from grader.grading.judging.diagnosis import hint_for, placed_in
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package
-from grader.grading.judging.judge_run import same_names, started, unheard, unserved
+from grader.grading.judging.judge_run import notes_on_unheard, same_names, unserved, unusual_starts
 from grader.grading.judging.values import as_number
 from grader.grading.model.report import Pace, Summary, TopicSummary
 from grader.runtime.model.extras import pip_install
@@ -50,7 +50,13 @@ def summarise(
     graphs = trace.graphs()
     caught = _caught(trace)
     faults = (*trace.faults(), *caught)
-    seen = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served), *_stateless(trace))
+    seen = (
+        *unusual_starts(trace),
+        *same_names(trace),
+        *notes_on_unheard(trace),
+        *unserved(trace, served),
+        *_stateless(trace),
+    )
     notes = (*seen, *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(

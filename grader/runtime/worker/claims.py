@@ -48,7 +48,7 @@ def readers_of(claims: Iterable[dict[str, Any]], topic: str) -> list[dict[str, A
     return [c for c in claims if c["kind"] == "subscription" and c["name"] == topic]
 
 
-def ends_of(claims: Iterable[dict[str, Any]], kind: str, name: str) -> list[dict[str, Any]]:
+def claims_of(claims: Iterable[dict[str, Any]], kind: str, name: str) -> list[dict[str, Any]]:
     """Return the endpoints of a kind and name; every node has some services."""
     # The services of parameters and of types come with a node, and hosts do not report them one by one.
     node = name.rpartition("/")[0] if kind == "service" else ""

@@ -19,7 +19,7 @@ from grader.runtime.model.scenario import Event
 from grader.runtime.stimuli.calls import Ask
 from grader.runtime.stimuli.events import TopicEvent
 from grader.runtime.stimuli.simulation import Step
-from grader.runtime.worker.claims import ORDINARY_END, compatible, ends_of, passes, readers_of
+from grader.runtime.worker.claims import ORDINARY_END, claims_of, compatible, passes, readers_of
 
 #: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
 #: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
@@ -340,7 +340,7 @@ class Core(Generic[P]):
         for channel, count in sorted(counts.items()):
             kind, _, name = channel.partition(" ")
             if kind == "topic":
-                writers = ends_of(sender.claims, "publisher", name)
+                writers = claims_of(sender.claims, "publisher", name)
                 self.kept[sender.name, name] += count if any(w["latched"] for w in writers) else 0
                 for process in self.processes:
                     if any(compatible(w, r) for w in writers for r in readers_of(process.claims, name)):
@@ -353,7 +353,7 @@ class Core(Generic[P]):
     ) -> None:
         """Announce requests to servers, or responses to clients: every client of a service receives all responses."""
         for process in self.processes:
-            own = ends_of(process.claims, "service" if kind == "request" else "client", service)
+            own = claims_of(process.claims, "service" if kind == "request" else "client", service)
             if not process.ended and any(passes(sender, end) for sender in ends for end in own):
                 announce(process, f"{kind} {service}", count)
 
@@ -375,7 +375,7 @@ class Core(Generic[P]):
 
     def is_new(self, process: P, topic: str) -> bool:
         """Return whether a process has a publisher on a topic that has appeared at this instant."""
-        publishers = ends_of(process.claims, "publisher", topic)
+        publishers = claims_of(process.claims, "publisher", topic)
         return any(self._appeared_ns.get((process.name, c.get("number", 0))) == self.now_ns for c in publishers)
 
     def is_on_its_way(self, channel: str) -> bool:
@@ -392,7 +392,7 @@ def announce(process: Process, channel: str, count: int) -> None:
 def senders(process: Process, channel: str) -> Sequence[Mapping[str, Any]]:
     """Return the ends of a service with which a process sends on a channel."""
     kind, _, service = channel.partition(" ")
-    return ends_of(process.claims, "client" if kind == "request" else "service", service) or (ORDINARY_END,)
+    return claims_of(process.claims, "client" if kind == "request" else "service", service) or (ORDINARY_END,)
 
 
 class Arriving:

@@ -32,7 +32,7 @@ from grader.runtime.padding import without_padding
 from grader.runtime.worker.claims import BACKGROUND_TYPES
 from grader.runtime.worker.console import TEXT_CHARACTERS, Logged
 from grader.runtime.worker.core import Taken, in_order
-from grader.runtime.worker.ros_names import asked, listed
+from grader.runtime.worker.ros_names import ask_for_all, asked
 from grader.runtime.worker.service_ends import ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
@@ -124,7 +124,7 @@ class Observer:
             "publisher": self.node.get_publishers_info_by_topic,
             "subscription": self.node.get_subscriptions_info_by_topic,
         }
-        topics: list[tuple[str, list[str]]] = listed(self.node.get_topic_names_and_types)
+        topics: list[tuple[str, list[str]]] = ask_for_all(self.node.get_topic_names_and_types)
         nobody: list[Any] = []
         ends = [
             self._endpoint(kind, topic, info)
@@ -225,7 +225,7 @@ class Observer:
         return [_full_name(*pair) for pair in self._names_in_graph(existing)]
 
     def _names_in_graph(self, existing: Collection[str] | None) -> list[tuple[str, str]]:
-        known: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
+        known: list[tuple[str, str]] = ask_for_all(self.node.get_node_names_and_namespaces)
         pairs = [p for p in known if p[0] not in {*self._names, UNKNOWN_NODE}]
         return [p for p in pairs if existing is None or _full_name(*p) in existing or self._publishes_anything(*p)]
 
@@ -240,9 +240,9 @@ class Observer:
     def counts(self) -> dict[str, int]:
         """Count the endpoints and nodes in the graph by name, as any node sees them, including the grader's own."""
         node = self.node
-        nodes: list[tuple[str, str]] = listed(node.get_node_names_and_namespaces)
-        topics: list[tuple[str, list[str]]] = listed(node.get_topic_names_and_types)
-        services: list[tuple[str, list[str]]] = listed(node.get_service_names_and_types)
+        nodes: list[tuple[str, str]] = ask_for_all(node.get_node_names_and_namespaces)
+        topics: list[tuple[str, list[str]]] = ask_for_all(node.get_topic_names_and_types)
+        services: list[tuple[str, list[str]]] = ask_for_all(node.get_service_names_and_types)
         found = Counter(f"node {_full_name(*pair)}" for pair in nodes)
         for topic, _ in topics:
             if topic not in BACKGROUND:

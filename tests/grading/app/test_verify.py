@@ -19,9 +19,9 @@ from sandboxes import USER, unreachable, user_start
 from verifying import differences, program, verified, written
 
 from grader.cli.main import app
-from grader.cli.verify import exit_code
+from grader.cli.verify import verification_exit_code
 from grader.grading.app import verify as verifying
-from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions, surroundings
+from grader.grading.app.conditions import LOOPS, VerifyCondition, made_conditions, surroundings
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.verify import VerifyRequest, verify
 from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
@@ -284,7 +284,7 @@ def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Verify
 
 def made(name: str, isolation: str = "landlock", **changes: Any) -> VerifyCondition:
     """Return a condition, in surroundings that differ from those here in some ways."""
-    (condition,) = conditions([name], isolation, replace(surroundings(), **changes))
+    (condition,) = made_conditions([name], isolation, replace(surroundings(), **changes))
     return condition
 
 
@@ -362,7 +362,7 @@ def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
             isolation_from_name(name)
         except EnvironmentFault:
             continue
-        found = next(one for one in conditions([], "none", surroundings()) if one.name == name)
+        found = next(one for one in made_conditions([], "none", surroundings()) if one.name == name)
         asked = made(name, "none")
         if found.not_tried:
             assert "does not contain" in found.not_tried or asked.not_tried
@@ -372,7 +372,7 @@ def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
 
 def test_the_sandbox_of_the_first_recording_is_no_other_condition() -> None:
     """It would only be recorded again."""
-    assert [one.name for one in conditions(["again", "landlock"], "landlock", surroundings())] == ["again"]
+    assert [one.name for one in made_conditions(["again", "landlock"], "landlock", surroundings())] == ["again"]
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------
@@ -463,5 +463,5 @@ def test_exit_codes(then: str, code: int, state: ConditionState, tmp_path: Path)
     """A recording that is missing or failed is no difference, and does not count as the same either."""
     (path,) = written(tmp_path, {"ada": REPEATING["plain"]})
     found = recorded_by(ANSWERS.format(mark=str(tmp_path / "mark"), then=then), path)
-    assert exit_code(found) == code, found
+    assert verification_exit_code(found) == code, found
     assert [condition.state for condition in found.tried] == [state]
