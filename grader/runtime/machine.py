@@ -22,8 +22,7 @@ from grader.runtime.model.releases import release_of
 from grader.runtime.outdated import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, outdated, version_of
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.bubblewrap import ENTERABLE
-from grader.runtime.sandbox.choose import Machine, inspect_tier, inspect_tiers, sandbox_memory
-from grader.runtime.sandbox.exposure import some_user
+from grader.runtime.sandbox.choose import Machine, inspect_tiers, sandbox_memory
 from grader.runtime.sandbox.properties import SETTINGS_FOLDER, has_filter, package_command, setting_command
 from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
 from grader.runtime.supervisor.byte_code import byte_code
@@ -64,15 +63,6 @@ def sandboxes(ros: RosInstallation) -> tuple[TierReport, ...]:
     return inspect_tiers(Machine(ros))
 
 
-def sandbox(name: str) -> TierReport:
-    """Return the report on one sandbox, from its last test if nothing has changed since.
-
-    Raises:
-        EnvironmentFault: This machine lacks ROS.
-    """
-    return inspect_tier(name, Machine(find_ros()))
-
-
 def can_fork(name: str) -> bool:
     """Return whether students' nodes are forked in a sandbox, not executed; raises EnvironmentFault without it."""
     return isolation_from_name(name).can_fork
@@ -90,11 +80,6 @@ def easiest_remedy(tiers: Sequence[TierReport]) -> str:
     """Return the easiest fix of a sandbox; running as another user comes last, because it takes the most effort."""
     ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
     return next((tier.remedy for tier in ordered if tier.remedy), "")
-
-
-def other_user() -> int:
-    """Return a user that no other grader on this machine uses."""
-    return some_user()
 
 
 def software(ros: RosInstallation | None) -> Iterator[Fact]:
