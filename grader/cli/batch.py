@@ -15,7 +15,7 @@ from grader.cli.options import (
     drawn_with,
     print_result,
 )
-from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
+from grader.cli.remembered import ClassCommand, options_to_keep
 from grader.cli.run_options import run_options
 from grader.grading.model.grading_options import BATCH, ISOLATION, SANDBOXES, GradingOptions
 from grader.runtime.model.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
@@ -29,7 +29,7 @@ _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "can
 _RERUNS = ("changed", "failed", "undecided", "all")
 
 
-@click.command(name="batch", cls=RepeatingCommand)
+@click.command(name="batch", cls=ClassCommand)
 @click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", "results", metavar="RESULTS", required=True, type=PATH, help="Folder for the results.")
 @click.option("--layout", type=click.Choice(_LAYOUTS), default="auto", help="How submissions are named.")
@@ -99,8 +99,8 @@ def command(  # noqa: PLR0913  one parameter an option
     """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
 
     The same command goes on where it was stopped. Only what is new or changed is graded; `--rerun` adds what failed,
-    what was undecided, or all. RESULTS keeps the options that change marks, pages or exported files, such as --adjust
-    and --roster: they apply again unless given otherwise, and --no-adjust, --no-roster and so on leave one out.
+    what was undecided, or all. RESULTS/class.yaml keeps the options that change marks, pages or exported files,
+    such as --adjust and --roster: they apply again unless given otherwise, and deleting its line leaves one out.
 
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
     used, or a rubric has a mistake, 3 something failed or was undecided through no fault of a student, 130 interrupted.
@@ -130,7 +130,6 @@ def command(  # noqa: PLR0913  one parameter an option
         pattern=pattern,
         roster=roster,
         adjustments=adjustments,
-        no_adjustments=is_left_out(ctx, "adjustments"),
         options=options_to_keep(ctx),
         grading=request_for("", options),
         jobs=jobs,

@@ -126,3 +126,12 @@ def scores(graded: Graded) -> dict[str, Fraction | None]:
 
 
 POINTS = Fraction
+
+
+def without_line(results: Path, option: str) -> None:
+    """Leave an option of a class out: delete its line in `class.yaml`."""
+    path = results / "class.yaml"
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    kept = [line for line in lines if not line.startswith(f"{option}:")]
+    assert len(kept) == len(lines) - 1
+    path.write_text("".join(kept), encoding="utf-8")

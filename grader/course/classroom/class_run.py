@@ -144,17 +144,13 @@ def _adjustments(course: ClassRequest, exercises: Sequence[Exercise], warn: Call
 
     Raises ClassError if the last run applied decisions and this one was given none: marks would change in silence.
     """
-    if course.no_adjustments:
-        return Adjustments()
     kept = course.results / ADJUSTMENTS
     there = kept if kept.is_file() else None
     path = course.adjustments or there
     if path is None:
-        last = read_last_run(course.results)
-        if last.decisions:
-            count = f"{last.decisions} decision{'' if last.decisions == 1 else 's'}"
-            text = f"--adjust: expected the {count} of {last.adjustments}, which the last run applied, found none"
-            raise ClassError(text, "give the file again with --adjust, or leave it out with --no-adjust")
+        for applied in read_last_run(course.results).options.get("adjust", ()):
+            text = f"{course.results / RUN}: --adjust: expected {applied}, which the last run used, found nothing there"
+            raise ClassError(text, "give it again with --adjust, or delete the line to leave it out")
         return Adjustments()
     if there is not None and path.resolve() != there.resolve():
         warn(f"{there} is not applied, because --adjust names {path}")
@@ -165,8 +161,8 @@ def _adjustments(course: ClassRequest, exercises: Sequence[Exercise], warn: Call
 
 def _kept_options(course: ClassRequest, adjustments: Adjustments) -> LastRun:
     """Return what the next run needs to know of this one."""
-    path = "" if adjustments.path is None else str(adjustments.path.resolve())
-    return LastRun(course.options, path, adjustments.count, _places(course.sources))
+    applied = {} if adjustments.path is None else {"adjust": (str(adjustments.path.absolute()),)}
+    return LastRun({**course.options, **applied}, _places(course.sources))
 
 
 def _places(sources: Sequence[Path]) -> tuple[str, ...]:

@@ -55,7 +55,6 @@ class ClassRequest:
     pattern: str = ""  # a regular expression for names, used instead of the layout; empty for none
     roster: Path | None = None  # CSV file of the class; None if there is none
     adjustments: Path | None = None  # YAML file of late days and changed scores; None if there is none
-    no_adjustments: bool = False  # whether no decisions are applied, not even those kept in the results folder
     grading: GradeRequest = _GRADING  # the request as for one submission; its path is ignored
     jobs: int | None = None  # submissions graded in parallel; None for one per processor
     rerun: str = CHANGED  # `--rerun`, one of the values above

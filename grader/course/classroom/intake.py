@@ -73,7 +73,7 @@ def _mark(text: str) -> str:
 
 
 #: What makes a folder one with the results of a class.
-_OF_RESULTS = ("run.json", "students", "assets")
+_OF_RESULTS = ("class.yaml", "students", "assets")
 _TWO_WAYS = "its name can be read in two ways, so it is in nobody's submission"
 
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from class_samples import FakeScheduler, course, grade, hand_in, report, scores
+from class_samples import FakeScheduler, course, grade, hand_in, report, scores, without_line
 from hypothesis import given
 from hypothesis import strategies as st
 from places import ROOT
@@ -202,10 +202,11 @@ def test_a_criterion_is_decided_beside_what_the_grader_found(tmp_path: Path) -> 
     assert "10 points, less 1 for 1 day late." in page
     assert "Comment: see &lt;my&gt; note" in page
     (tmp_path / "out/adjust.yaml").unlink()
-    with pytest.raises(ClassError, match=r"expected the 1 decision of .*adjust\.yaml, which the last run applied"):
+    with pytest.raises(ClassError, match=r"expected .*adjust\.yaml, which the last run used, found nothing"):
         grade(course(tmp_path / "in", tmp_path / "out"))
     assert (tmp_path / "out/students/ada/feedback.html").read_text(encoding="utf-8") == page
-    graded = grade(course(tmp_path / "in", tmp_path / "out", no_adjustments=True))
+    without_line(tmp_path / "out", "adjust")
+    graded = grade(course(tmp_path / "in", tmp_path / "out"))
     assert graded.moved == ("ada 9 -> 4",)
     page = (tmp_path / "out/students/ada/feedback.html").read_text(encoding="utf-8")
     assert "<title>ada: 4 of 10 points</title>" in page
@@ -405,7 +406,8 @@ def test_a_renamed_file_is_graded_under_its_new_name(tmp_path: Path) -> None:
     assert (tmp_path / "in/ada/deep/Score.py").is_file()  # what was handed in is not changed
     assert (tmp_path / "out/unpacked/renamed/ada/deep/score.py").read_text(encoding="utf-8") == "7"
     again = FakeScheduler(default="failed")
-    grade(course(tmp_path / "in", tmp_path / "out", no_adjustments=True), again)
+    without_line(tmp_path / "out", "adjust")
+    grade(course(tmp_path / "in", tmp_path / "out"), again)
     assert set(again.graded) == {"ada", "bob", "cleo"}
 
 
