@@ -41,14 +41,14 @@ from grader.course.classroom import receiving as remote
 from grader.course.classroom import store as kept
 from grader.course.classroom.class_run import grade_class
 from grader.course.classroom.cluster.dispatcher import connected
-from grader.course.classroom.grading import ALL, CHANGED, ClassRequest, digest_of
+from grader.course.classroom.grading import ALL, CHANGED, ClassRequest, handed_in_digest
 from grader.course.classroom.intake import HandedInEntry
 from grader.course.classroom.local import LocalScheduler, MakeScheduler, Task
-from grader.course.classroom.messages import GradingJob, JobResult, Terms, files_below
+from grader.course.classroom.messages import GradingJob, JobResult, Terms, plain_files
 from grader.course.classroom.store import ResultStatus
 from grader.course.classroom.watching import Watcher
 from grader.course.classroom.worker import PARTS
-from grader.course.similarity.finding import read_given
+from grader.course.similarity.finding import read_templates
 from grader.grading.app.grade import read_exercises, wanted_files
 from grader.grading.app.request import GradeRequest
 from grader.runtime.shipped import shipped
@@ -119,7 +119,7 @@ def run(place: Path, graded: Path, rerun: str, *, similarity: bool, dask: bool) 
         grading=GradeRequest(""),
         jobs=2,
         rerun=CHANGED if rerun == "first" else rerun,
-        given=read_given((shipped("student_template"),)) if similarity else None,
+        given=read_templates((shipped("student_template"),)) if similarity else None,
     )
     command = [sys.executable, __file__, "--serve", str(graded)]
     with dask_scheduler(graded) if dask else nullcontext(partial(LocalScheduler, command=command)) as make:
@@ -140,7 +140,7 @@ def dask_scheduler(graded: Path) -> Iterator[MakeScheduler]:
         with scratch_folder() as scratch:
             task = remote.write_task(terms, job, scratch)
             status = copied(task, graded)
-            return JobResult(machine, kept.dump(status), files_below(task.into))
+            return JobResult(machine, kept.dump_status(status), plain_files(task.into))
 
     remote.grade_job = grade_job
     with (
@@ -157,7 +157,7 @@ def serve(graded: Path) -> None:
         os.chdir(request["folder"])
         task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
         status = copied(task, graded)
-        sys.stdout.write(json.dumps({"done": json.loads(kept.dump(status))}) + "\n")
+        sys.stdout.write(json.dumps({"done": json.loads(kept.dump_status(status))}) + "\n")
         sys.stdout.flush()
 
 
@@ -172,10 +172,10 @@ def copied(task: Task, graded: Path) -> ResultStatus:
             shutil.copytree(source, task.into / name)
         elif source.is_file():
             shutil.copyfile(source, task.into / name)
-    status = kept.load((found / kept.RESULT).read_bytes())
+    status = kept.load_status((found / kept.RESULT).read_bytes())
     assert status is not None
     with tempfile.TemporaryDirectory() as scratch:
-        digest, _ = digest_of(HandedInEntry(task.name, task.label, task.submission), Path(scratch), wanted())
+        digest, _ = handed_in_digest(HandedInEntry(task.name, task.label, task.submission), Path(scratch), wanted())
     return replace(
         status,
         key=task.conditions.key(digest),

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade
+from grader.grading.app.start import grade_once
 from grader.grading.reporting.html.assets import bundle
 from grader.grading.reporting.html.render import render_html
 
@@ -23,7 +23,7 @@ def main() -> None:
     """Print one line a submission."""
     submissions = sys.argv[1:] or [str(ROOT / "reference_solutions")]
     for submission in submissions:
-        report = grade(GradeRequest(submission), lambda _: None)
+        report = grade_once(GradeRequest(submission), lambda _: None)
         started = time.perf_counter()
         render_html(report)
         first_ms = 1000 * (time.perf_counter() - started)

@@ -19,7 +19,7 @@ sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "tests" / "course" /
 import copies  # noqa: E402  beside the tests
 from sample_folders import folders_in  # noqa: E402  as above
 
-from grader.course.similarity.finding import find_similar, read_given, read_programs  # noqa: E402  as above
+from grader.course.similarity.finding import find_similar, read_compared, read_templates  # noqa: E402  as above
 from grader.course.similarity.library import Handed  # noqa: E402  as above
 
 CLASSES = ("velocity", "odom", "fan", "joint", "angle", "battery")
@@ -29,7 +29,7 @@ WAYS = tuple(copies.DISGUISES)
 def people(prefix: str) -> list[Handed]:
     """Return a submission for each folder of right programs that begins with a word."""
     folders = folders_in("correct", "threads")
-    return [Handed(f.name, f.name, *read_programs(f)) for f in folders if f.name.startswith(prefix)]
+    return [Handed(f.name, f.name, *read_compared(f)) for f in folders if f.name.startswith(prefix)]
 
 
 def disguised(one: Handed, way: str, seed: int) -> Handed | None:
@@ -44,7 +44,7 @@ def disguised(one: Handed, way: str, seed: int) -> Handed | None:
 def main() -> None:
     """Print what is found in each class, and the shares of all."""
     draw = random.Random(int(sys.argv[1]) if len(sys.argv) > 1 else 1)
-    given = read_given([ROOT / "student_template"])
+    given = read_templates([ROOT / "student_template"])
     hits: Counter[str] = Counter()
     made: Counter[str] = Counter()
     besides: list[list[str]] = []

@@ -29,7 +29,7 @@ from attack_runs import HERE, REFERENCE, Attack, read_attacks
 from sample_folders import folders_in
 
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade
+from grader.grading.app.start import grade_once
 from grader.runtime.model.errors import GraderError
 
 NODE = "velocity_publisher"
@@ -115,7 +115,7 @@ def run(arena: Arena, hostile: list[Attack], runs: int) -> tuple[list[Held], Cou
 def score_of(folder: Path, rubric: Path) -> str:
     """Grade once and return what it came to, in a word."""
     try:
-        report = grade(GradeRequest(str(folder), rubrics=(rubric,), isolation=TIER), lambda _: None)
+        report = grade_once(GradeRequest(str(folder), rubrics=(rubric,), isolation=TIER), lambda _: None)
     except GraderError as error:
         print(error.message, file=sys.stderr, flush=True)
         return "refused"

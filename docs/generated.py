@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import click
@@ -27,6 +28,7 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from ruamel.yaml import YAML
 
 from grader import api
+from grader.api import unstable as unstable_api
 from grader.cli.main import app
 from grader.grading.app.explain import explain_checks, explain_rubrics
 from grader.grading.judging.run_check import check_name
@@ -314,21 +316,45 @@ def _draw(ax: Axes, panel: Panel) -> None:
 
 def interface() -> str:
     """Return a section for each topic of `grader.api`: signature and docstring of each name."""
-    own = "\n\n".join(_public(name) for name in ("grade", "observe", "rejudge"))
-    sections = [f"## Grade, observe, judge again\n\n{own}"]
-    for title, homes in api.CONTENTS.items():
+    own = "\n\n".join(_public(api, name) for name in ("grade", "observe", "rejudge"))
+    return f"## Grade, observe, judge again\n\n{own}\n\n{_topics(api)}"
+
+
+def unstable() -> str:
+    """Return the same for `grader.api.unstable`."""
+    return _topics(unstable_api)
+
+
+def _topics(door: ModuleType) -> str:
+    sections = []
+    for title, homes in door.CONTENTS.items():
         names = [name for each in homes.values() for name in each.split()]
-        sections.append(f"## {title}\n\n" + "\n\n".join(map(_public, names)))
+        sections.append(f"## {title}\n\n" + "\n\n".join(_public(door, name) for name in names))
     return "\n\n".join(sections)
 
 
-def _public(name: str) -> str:
+def about(door: ModuleType, name: str) -> str:
+    """Return the docstring of a name of `grader.api`, or the comment above a constant or a type of parameters."""
+    value = inspect.unwrap(getattr(door, name))  # one that remembers results is a function too
+    if inspect.isfunction(value) or (inspect.isclass(value) and not hasattr(value, "__args__")):
+        return inspect.cleandoc(value.__doc__ or "")
+    home = next(home for homes in door.CONTENTS.values() for home, names in homes.items() if name in names.split())
+    file = Path(str(sys.modules[home].__file__))
+    for path in (file, *sorted(file.parent.glob("*.py"))):  # a package hands on names of its modules
+        lines = path.read_text(encoding="utf-8").split("\n")
+        for index, line in enumerate(lines):
+            if re.match(rf"{name}\b.*=", line):
+                return _comment_above(lines, index)
+    raise LookupError(f"{home}.{name}: expected an assignment, found none")
+
+
+def _public(door: ModuleType, name: str) -> str:
     """Return the entry of one name."""
-    value = inspect.unwrap(getattr(api, name))  # one that remembers results is a function too
+    value = inspect.unwrap(getattr(door, name))
+    doc = about(door, name)
     if not (inspect.isfunction(value) or inspect.isclass(value)) or hasattr(value, "__args__"):
         text = re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Z~])", "", repr(value)).replace("~", "")
-        return f"### `{name}`\n\n`{text}`"
-    doc = inspect.cleandoc(value.__doc__ or "")
+        return f"### `{name}`\n\n`{text}`\n\n{doc}"
     text = f"### `{name}`\n\n"
     if inspect.isfunction(value):
         text += f"```text\n{name}{_plain(inspect.signature(value))}\n```\n\n"
@@ -550,6 +576,7 @@ NAMES: Mapping[str, Callable[[], str]] = {
     "gallery": gallery,
     "examples": examples,
     "interface": interface,
+    "unstable": unstable,
     "limits": limits,
 }
 

@@ -16,12 +16,12 @@ from dataclasses import field
 from fractions import Fraction
 from typing import Any
 
-from grader.grading.judging.authored import breach
+from grader.grading.judging.authored import finding_flaw
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.diagnosis import fault_of
-from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, unfit
+from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, clue_flaw
 from grader.grading.judging.findings import met, not_met, partly
-from grader.grading.judging.source import read
+from grader.grading.judging.source import read_source
 from grader.grading.model.exercise import Check, Criterion, Finding, Outcome, ask
 from grader.grading.model.report import Verdict
 from grader.runtime.model.dataclass import dataclass
@@ -67,7 +67,7 @@ def judge(check: Check, trace: Trace, sources: Mapping[str, str] | None = None) 
     """
     before = repr(trace)
     finding = ask(check, trace, sources)
-    wrong = breach(finding)
+    wrong = finding_flaw(finding)
     if wrong:
         raise ValueError(f"{type(check).__name__} {wrong}")
     if repr(ask(check, trace, sources)) != repr(finding):  # NaN never equals itself
@@ -124,11 +124,11 @@ def explain(
         evidence=finding.evidence,
         problem=finding.problem,
     )
-    files = {name: read(name, text) for name, text in sources.items()}
+    files = {name: read_source(name, text) for name, text in sources.items()}
     others = tuple(_criterion(f"sibling_{n}", one, trace) for n, one in enumerate(siblings))
     case = Case(criterion, verdict, trace, files, fault_of(verdict, trace), others, finding.facts)
     clue = rule.clue(case)
-    if clue is not None and (wrong := unfit(clue, case)):
+    if clue is not None and (wrong := clue_flaw(clue, case)):
         raise ValueError(f"the rule {rule.id}: {wrong}")
     return clue
 

@@ -18,7 +18,7 @@ PARSERS: Mapping[str, str] = {
     **dict.fromkeys(
         (
             *("grader.runtime.host.packages.parse", "grader.runtime.host.packages.parsed"),
-            *("grader.runtime.programs.inert.read", "grader.grading.judging.source.parsed"),
+            *("grader.runtime.programs.inert.read_inert", "grader.grading.judging.source.parsed_source"),
         ),
         "Python",
     ),

@@ -12,17 +12,23 @@ import textwrap
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import generated
 import pytest
 from places import ROOT, TESTS
 
 import grader
 from grader import api
+from grader.api import unstable
 from grader.grading.model import exercise
 from grader.runtime.model import errors
 
 PINNED = TESTS / "api.txt"
+#: What may change is pinned, too: that it does is meant, then.
+UNSTABLE = TESTS / "api_unstable.txt"
+DOORS = {api: PINNED, unstable: UNSTABLE}
 #: Python that authors write, or copy from a page.
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), *(ROOT / "examples").rglob("*.md"), ROOT / "README.md"])
 SCRIPTS = sorted([*(ROOT / "examples").rglob("*.py")])
@@ -38,23 +44,38 @@ def signature(value: Any) -> str:
     return re.sub(r"<[^<>]* at 0x[0-9a-f]+>", "...", str(inspect.signature(value)))
 
 
-def described(name: str) -> str:
-    value = inspect.unwrap(getattr(api, name))  # one that remembers results is a function too
+def described(door: ModuleType, name: str) -> str:
+    value = inspect.unwrap(getattr(door, name))  # one that remembers results is a function too
     plain = inspect.isfunction(value) or (inspect.isclass(value) and not hasattr(value, "__args__"))
     return f"{name}{signature(value)}" if plain else f"{name}: {value!r}"
 
 
-def test_names_and_signatures_are_pinned() -> None:
+@pytest.mark.parametrize("door", DOORS, ids=lambda door: door.__name__)
+def test_names_and_signatures_are_pinned(door: ModuleType) -> None:
     """A change of the file is a change for everybody who wrote a check; `UPDATE_GOLDEN=1` writes it."""
-    text = "\n".join(map(described, api.__all__)) + "\n"
+    text = "".join(f"{described(door, name)}\n" for name in door.__all__)
     if os.environ.get("UPDATE_GOLDEN"):
-        PINNED.write_text(text, encoding="utf-8")
-    assert PINNED.read_text(encoding="utf-8") == text
+        DOORS[door].write_text(text, encoding="utf-8")
+    assert DOORS[door].read_text(encoding="utf-8") == text
 
 
-def test_every_name_is_there_once_and_type_checkers_know_it() -> None:
+@pytest.mark.parametrize("door", DOORS, ids=lambda door: door.__name__)
+def test_every_name_is_described_and_on_its_page(door: ModuleType) -> None:
+    """By its docstring, or by the comment above a constant."""
+    page = (ROOT / "docs/reference" / ("api.md" if door is api else "api-unstable.md")).read_text(encoding="utf-8")
+    assert [name for name in door.__all__ if f"\n### `{name}`\n" not in page] == []
+    assert [name for name in door.__all__ if not generated.about(door, name).strip()] == []
+
+
+def test_no_name_is_in_both() -> None:
+    """What is promised cannot change."""
+    assert set(api.__all__) & set(unstable.__all__) == set()
+
+
+@pytest.mark.parametrize("door", DOORS, ids=lambda door: door.__name__)
+def test_every_name_is_there_once_and_type_checkers_know_it(door: ModuleType) -> None:
     """The table, by which names are imported, and the imports for type checkers are the same."""
-    tree = ast.parse(Path(api.__file__).read_text(encoding="utf-8"))
+    tree = ast.parse(Path(str(door.__file__)).read_text(encoding="utf-8"))
     block = next(node for node in tree.body if isinstance(node, ast.If))
     typed = {
         str(alias.asname): (str(node.module), alias.name)
@@ -62,13 +83,14 @@ def test_every_name_is_there_once_and_type_checkers_know_it() -> None:
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
-    assert len(api.__all__) == len(set(api.__all__))
-    assert set(api.__all__) == {*typed, "grade", "observe", "rejudge"}
-    assert set(dir(api)) == set(api.__all__)
+    functions = {"grade", "observe", "rejudge"} if door is api else set()
+    assert len(door.__all__) == len(set(door.__all__))
+    assert set(door.__all__) == {*typed} | functions
+    assert set(dir(door)) == set(door.__all__)
     for name, (home, own) in typed.items():
-        assert getattr(api, name) is getattr(sys.modules[home], own)
+        assert getattr(door, name) is getattr(sys.modules[home], own)
     with pytest.raises(AttributeError, match="has no attribute nothing"):
-        api.nothing  # noqa: B018
+        door.nothing  # noqa: B018
 
 
 def test_every_error_is_public_and_in_the_tree_of_the_docstring() -> None:
@@ -88,7 +110,7 @@ def grader_imports(tree: ast.Module) -> Iterator[str]:
 
 def private(source: str) -> list[str]:
     """Return what a program imports of the package and may not."""
-    public = {f"grader.api.{name}" for name in api.__all__}
+    public = {f"{door.__name__}.{name}" for door in DOORS for name in door.__all__}
     return [name for name in grader_imports(ast.parse(source)) if name not in public]
 
 
@@ -143,7 +165,7 @@ def test_the_members_of_a_check_are_declared_in_one_place() -> None:
     for path in (Path(grader.__file__).parent / "grading" / "judging").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             named = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
-            if named in ("getattr", "has") and isinstance(node, ast.Call):
+            if named in ("getattr", "has_member") and isinstance(node, ast.Call):
                 about = ast.unparse(node.args[0])
                 if re.fullmatch(r"(\w+\.)?check|kind", about) and isinstance(node.args[1], ast.Constant):
                     asked.add(str(node.args[1].value))

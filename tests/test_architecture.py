@@ -511,3 +511,37 @@ def test_a_repeated_helper_is_found(tmp_path: Path) -> None:
         text = f'def {name}(path):\n    """{name}"""\n    path.mkdir()\n    path.chmod(0o755)\n    return path\n'
         (tmp_path / f"test_{name}.py").write_text(text, encoding="utf-8")
     assert repeated(tmp_path) == [["test_one.py: one", "test_other.py: other"]]
+
+
+#: Functions that several modules have under one name, because each is asked for by it.
+HOOKS = {
+    "main": "a program that is started with `python -m`, or a script of it",
+    "command": "the command of a module in `grader/cli/`, which `CommandLine` imports by this name",
+    "install": "puts the module's replacements in place, in a process that they are for",
+}
+
+
+def public_functions(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    named = (node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+    return {name for name in named if not name.startswith("_")}
+
+
+def test_a_public_function_has_a_name_of_its_own() -> None:
+    """Whoever searches for a name finds one function; what stands in for packages of ROS has their names.
+
+    The door `grader.api` has the names of the commands.
+    """
+    homes: dict[str, list[str]] = {}
+    for path in sorted((ROOT / "grader").rglob("*.py")):
+        if "ros_packages" not in path.parts:
+            for name in public_functions(path) - HOOKS.keys():
+                homes.setdefault(name, []).append(path.relative_to(ROOT).as_posix())
+    assert {name: found for name, found in homes.items() if len(found) > 1} == {}
+
+
+def test_a_planted_second_function_is_found(tmp_path: Path) -> None:
+    """The rule can fail."""
+    file = tmp_path / "planted.py"
+    file.write_text("def shown(): ...\ndef _own(): ...\nasync def asked(): ...\n", encoding="utf-8")
+    assert public_functions(file) == {"shown", "asked"}

@@ -49,7 +49,7 @@ def test_the_page_lists_every_parser() -> None:
         ("import struct\nstruct.unpack('I', x)\n", {"binary"}),
         ("import re\nre.fullmatch(x, y)\n", {"regular expressions"}),
         ("import re\nre.escape(x)\n", set()),
-        ("from grader.runtime.programs.inert import read\nread(x)\n", {"Python"}),
+        ("from grader.runtime.programs.inert import read_inert\nread_inert(x)\n", {"Python"}),
         ("import codecs\ncodecs.decode(x, y)\n", {"text in any encoding"}),
     ],
 )

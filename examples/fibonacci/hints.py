@@ -3,7 +3,8 @@
 import ast
 from collections.abc import Iterator
 
-from grader.api import Case, Clue, Outcome, first_line, hint_rule, last_name, reached
+from grader.api import Case, Clue, Outcome, hint_rule
+from grader.api.unstable import first_line, last_name, reached
 
 
 def executing(case: Case) -> Iterator[ast.AST]:

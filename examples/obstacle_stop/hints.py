@@ -2,7 +2,8 @@
 
 import ast
 
-from grader.api import Case, Clue, chain, conditions, hint_rule, last_name, publish_calls
+from grader.api import Case, Clue, hint_rule
+from grader.api.unstable import chain, conditions, last_name, publish_calls
 
 
 def ranges_read(case: Case) -> list[ast.Attribute]:

@@ -15,7 +15,7 @@ from grader.cli.options import (
     drawn_with,
     print_result,
 )
-from grader.cli.remembered import RepeatingCommand, is_left_out, options_to_keep
+from grader.cli.remembered import ClassCommand, options_to_keep
 from grader.cli.run_options import run_options
 from grader.grading.model.grading_options import BATCH, ISOLATION, SANDBOXES, GradingOptions
 from grader.runtime.model.errors import ALL_MET, INTERRUPTED, NOT_ALL_MET, UNDECIDED, UNUSABLE
@@ -29,7 +29,7 @@ _LAYOUTS = ("auto", "folders", "github-classroom", "classroom50", "moodle", "can
 _RERUNS = ("changed", "failed", "undecided", "all")
 
 
-@click.command(name="batch", cls=RepeatingCommand)
+@click.command(name="batch", cls=ClassCommand)
 @click.argument("sources", metavar="SOURCE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", "results", metavar="RESULTS", required=True, type=PATH, help="Folder for the results.")
 @click.option("--layout", type=click.Choice(_LAYOUTS), default="auto", help="How submissions are named.")
@@ -99,8 +99,8 @@ def command(  # noqa: PLR0913  one parameter an option
     """Grade a class: every submission in SOURCE, a folder of submissions or a bulk download.
 
     The same command goes on where it was stopped. Only what is new or changed is graded; `--rerun` adds what failed,
-    what was undecided, or all. RESULTS keeps the options that change marks, pages or exported files, such as --adjust
-    and --roster: they apply again unless given otherwise, and --no-adjust, --no-roster and so on leave one out.
+    what was undecided, or all. RESULTS/class.yaml keeps the options that change marks, pages or exported files,
+    such as --adjust and --roster: they apply again unless given otherwise, and deleting its line leaves one out.
 
     Exit codes: 0 everybody was graded, 1 a submission cannot be used, 2 the command or something it was given cannot be
     used, or a rubric has a mistake, 3 something failed or was undecided through no fault of a student, 130 interrupted.
@@ -108,10 +108,10 @@ def command(  # noqa: PLR0913  one parameter an option
     if similarity:
         require("--similarity", "copydetect", "similarity")
     from grader.course.classroom.class_run import ClassRequest, grade_class
-    from grader.course.classroom.outputs import platforms, render_summary, summary_json
-    from grader.course.classroom.schedulers import ThisMachine, opened
+    from grader.course.classroom.outputs import platforms, render_graded, summary_json
+    from grader.course.classroom.schedulers import ThisMachine, opened_scheduler
     from grader.course.classroom.watching import shown_watcher
-    from grader.course.similarity.finding import read_given
+    from grader.course.similarity.finding import read_templates
     from grader.grading.app.request import request_for
     from grader.runtime.shipped import shipped
 
@@ -130,7 +130,6 @@ def command(  # noqa: PLR0913  one parameter an option
         pattern=pattern,
         roster=roster,
         adjustments=adjustments,
-        no_adjustments=is_left_out(ctx, "adjustments"),
         options=options_to_keep(ctx),
         grading=request_for("", options),
         jobs=jobs,
@@ -140,16 +139,19 @@ def command(  # noqa: PLR0913  one parameter an option
         title=title,
         standalone=standalone,
         platforms=platforms(canvas or "", canvas_gradebook, moodle, gradescope=gradescope),
-        given=read_given(templates or (shipped("student_template"),)) if similarity else None,
+        given=read_templates(templates or (shipped("student_template"),)) if similarity else None,
     )
     here = ctx.find_object(ThisMachine) or ThisMachine()
     try:
-        with opened(scheduler, jobs, complain, here) as make, shown_watcher(wanted=not no_progress) as watcher:
+        with (
+            opened_scheduler(scheduler, jobs, complain, here) as make,
+            shown_watcher(wanted=not no_progress) as watcher,
+        ):
             graded = grade_class(course, watcher, complain, make)
     except KeyboardInterrupt:
         click.echo("interrupted: what was graded is kept; run the same command again to continue", err=True)
         return INTERRUPTED
-    print_result(lambda: summary_json(graded), lambda _: render_summary(graded), as_json=as_json)
+    print_result(lambda: summary_json(graded), lambda _: render_graded(graded), as_json=as_json)
     for mistake, rows in graded.book.author_mistakes.items():
         count = "1 submission" if len(rows) == 1 else f"{len(rows)} submissions"
         complain(f"the rubric has a mistake: {mistake} ({count})", kind="error")

@@ -27,10 +27,10 @@ def command(*, name: str | None, rubrics: tuple[Path, ...], rules: bool, evidenc
         raise click.BadParameter("--on needs --rules, and no NAME: all rules are tried on the recording")
     if rules:
         return _explain_rules(name or "", rubrics, evidence, as_json=as_json)
-    from grader.grading.app.explain import everything, explain
+    from grader.grading.app.explain import everything, explain_name
     from grader.grading.reporting.explained import explanations_to_json, list_all, render_explanations
 
-    found = everything(rubrics) if name is None else explain(name, rubrics)
+    found = everything(rubrics) if name is None else explain_name(name, rubrics)
     render = list_all if name is None else render_explanations
     print_result(lambda: explanations_to_json(found), lambda page: render(found, width=page.width), as_json=as_json)
     return ALL_MET

@@ -92,7 +92,7 @@ def saves(submission: Path) -> Generator[bool]:
     folder, usual = submission if only is None else submission.parent, DefaultFilter()
 
     def matters(change: Change, path: str) -> bool:
-        return usual(change, path) and is_program(Path(path).name, only)
+        return usual(change, path) and is_reason(Path(path).name, only)
 
     news: bool | None = False
     while True:
@@ -123,7 +123,7 @@ def saves(submission: Path) -> Generator[bool]:
             time.sleep(_CHECK_MS / 1000)
 
 
-def is_program(name: str, only: str | None) -> bool:
+def is_reason(name: str, only: str | None) -> bool:
     """Return whether a change of a file of this name is a reason to grade again; `only` is a submission of one file."""
     return name == only if only is not None else name.endswith(".py")
 

@@ -37,9 +37,9 @@ def _list(*, folders: tuple[Path, ...], as_json: bool) -> int:
 
 def _print(folders: tuple[Path, ...], *, ready: bool, as_json: bool) -> int:
     from grader.grading.reporting.interface_list import packages_to_json, render_packages
-    from grader.runtime.interface_packages import described
+    from grader.runtime.interface_packages import course_packages
 
-    found = described(folders, ready=ready)
+    found = course_packages(folders, ready=ready)
     print_result(
         lambda: packages_to_json(found),
         lambda page: render_packages(found, width=page.width, colour=page.colour),

@@ -72,7 +72,7 @@ if TYPE_CHECKING:
 
         def opened(self, request: GradeRequest, progress: Progress, /) -> AbstractContextManager[RecordingSession]: ...
 
-        def grade(  # noqa: PLR0913  as in that module
+        def grade_once(  # noqa: PLR0913  as in that module
             self,
             request: GradeRequest,
             progress: Progress,
@@ -203,7 +203,9 @@ class _Default(click.Command):
 @click.option("--open", "opens", is_flag=True, help="Write the HTML page and open it in a browser.")
 @click.option("--no-progress", is_flag=True, help="Show no progress while grading.")
 @click.version_option(grader.__version__, prog_name="grade", message="%(prog)s %(version)s")
-def _grade(*, submission: str | None, options: GradingOptions, watch: bool, no_progress: bool, **as_given: Any) -> int:
+def _command(
+    *, submission: str | None, options: GradingOptions, watch: bool, no_progress: bool, **as_given: Any
+) -> int:
     """Grade a SUBMISSION (a folder, an archive or a .py file) and explain the score.
 
     Without one, the current folder is graded if it holds exercise files. A folder with the name of a command is graded
@@ -221,22 +223,22 @@ def _grade(*, submission: str | None, options: GradingOptions, watch: bool, no_p
                 early = start.opened_early(submission, options.rubrics, options.isolation, progress)
                 session = stack.enter_context(early)
         given = {"options": options, "watch": watch, "no_progress": no_progress, **as_given}
-        return _graded(invocation, session, submission=submission, **given)
+        return _run_command(invocation, session, submission=submission, **given)
 
 
 def _check_submission(submission: str, others: Sequence[str]) -> None:
     """Raise an error with what was probably meant, if there are several submissions, or none and something like it."""
-    from grader.cli.near_misses import meant_by, too_many
+    from grader.cli.near_misses import meant_submission, too_many
     from grader.grading.submissions.submission import not_there
 
     if others:
         raise too_many(submission, others)
-    hint = meant_by(submission, _SUBCOMMANDS)
+    hint = meant_submission(submission, _SUBCOMMANDS)
     if hint:
         raise not_there(submission, hint)
 
 
-def _graded(  # noqa: PLR0913  one parameter an option
+def _run_command(  # noqa: PLR0913  one parameter an option
     invocation: Invocation,
     session: RecordingSession | None,
     *,
@@ -255,7 +257,7 @@ def _graded(  # noqa: PLR0913  one parameter an option
 ) -> int:
     """Check the options, grade, and return the exit code."""
     from grader.cli import interactive
-    from grader.grading.reporting.delivery import Output, prepared
+    from grader.grading.reporting.delivery import Output, prepared_outputs
 
     rendered = tuple(output for output in outputs if output.format != EVIDENCE)
     if watch and (as_json or rendered != outputs):
@@ -264,7 +266,7 @@ def _graded(  # noqa: PLR0913  one parameter an option
     if opens and not pages:
         pages = [interactive.PAGE]
         rendered = (*rendered, Output("html", interactive.PAGE))
-    wanted = prepared((*rendered, Output("json")) if as_json else rendered, verbose=verbose)
+    wanted = prepared_outputs((*rendered, Output("json")) if as_json else rendered, verbose=verbose)
     for_whom = readers(audience, as_of)
     from grader.grading.app.request import request_for
     from grader.grading.app.seeds import PRACTICE
@@ -283,7 +285,7 @@ def _graded(  # noqa: PLR0913  one parameter an option
     grading = _Grading(invocation, request, wanted, for_whom, writer, min_score, not no_progress, page)
     # A folder that does not exist cannot be watched; grading it says so.
     watched = watch and Path(request.submission).exists()
-    return grading.each_save() if watched else grading.once(invocation.started, session)
+    return grading.each_save() if watched else grading.grade_and_deliver(invocation.started, session)
 
 
 @dataclass(slots=True)
@@ -299,9 +301,9 @@ class _Grading:
     shows_progress: bool
     page: Path | None  # the page to open after the first report; None to open none
 
-    def once(self, started: float, session: RecordingSession | None = None) -> int:
+    def grade_and_deliver(self, started: float, session: RecordingSession | None = None) -> int:
         """Grade, in a session if one is given, and return the exit code; the user waits since `started`."""
-        from grader.grading.model.report import exit_code
+        from grader.grading.model.report import report_exit_code
         from grader.grading.reporting.audience import told
         from grader.grading.reporting.delivery import deliver, early_delivery
 
@@ -311,7 +313,7 @@ class _Grading:
         with shown_progress(wanted=self.shows_progress) as progress:
             progress("starting")
             start = self.invocation.start()
-            report = start.grade(self.request, progress, remember, early, pictures=pictures, session=session)
+            report = start.grade_once(self.request, progress, remember, early, pictures=pictures, session=session)
         report = replace(report, duration_s=time.monotonic() - started)
         self._warn(report)
         deliver(report, self.outputs, self.readers)
@@ -326,7 +328,7 @@ class _Grading:
             open_page(self.page)
             self.page = None
 
-        return exit_code(seen, self.min_score)
+        return report_exit_code(seen, self.min_score)
 
     def each_save(self) -> int:
         """Grade now and after each save, in one session; return the exit code of the last time at Ctrl-C."""
@@ -337,7 +339,7 @@ class _Grading:
             with shown_progress(wanted=self.shows_progress) as progress:
                 session = stack.enter_context(start.opened(self.request, progress))
             while True:
-                code = _guarded(partial(self.once, started, session))
+                code = _guarded(partial(self.grade_and_deliver, started, session))
                 if code == INTERRUPTED:
                     return code
                 click.echo("watching for the next save; Ctrl-C ends this", err=True)
@@ -366,8 +368,8 @@ def _evidence_writer(folders: Sequence[Path], request: GradeRequest) -> Evidence
 
 
 #: The command `grade`.
-app = CommandLine(_grade, _SUBCOMMANDS, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
-_grade.context_settings = {**app.context_settings, "allow_extra_args": True}
+app = CommandLine(_command, _SUBCOMMANDS, name="grade", context_settings={"help_option_names": ["-h", "--help"]})
+_command.context_settings = {**app.context_settings, "allow_extra_args": True}
 
 
 def main() -> None:
@@ -398,9 +400,9 @@ def _guarded(run: Callable[[], object]) -> int:
         error.show()
         return UNUSABLE
     except click.ClickException as error:
-        from grader.cli.near_misses import hint_for
+        from grader.cli.near_misses import usage_hint
 
-        known = hint_for(error)
+        known = usage_hint(error)
         message = error.message if known else error.format_message()
         context = error.ctx if isinstance(error, click.UsageError) else None
         path = context.command_path.partition(_DEFAULT)[0].strip() if context is not None else "grade"

@@ -22,7 +22,7 @@ _BY_SUFFIX = {".htm": "html", **{FORMATS[name].suffix: name for name in reversed
 _NO_REPORT = ".pdf"
 
 
-def meant_by(submission: str, commands: Collection[str]) -> str:
+def meant_submission(submission: str, commands: Collection[str]) -> str:
     """Return a hint for a submission that does not exist: a file, an exercise or a command of nearly this name.
 
     Empty if the path exists or nothing is like it.
@@ -96,7 +96,7 @@ class Misused(click.UsageError):
         self.hint = hint
 
 
-def hint_for(error: click.ClickException) -> str:
+def usage_hint(error: click.ClickException) -> str:
     """Return a hint for a mistake on the command line; empty if nothing is known but what the help says."""
     if isinstance(error, Misused):
         return error.hint

@@ -57,6 +57,6 @@ def command(  # noqa: PLR0913  one parameter an option
         read_launch_arguments(launch_arguments, files),
     )
     with shown_progress(wanted=True) as progress:
-        summary = observe.observe(request, progress)
+        summary = observe.observe_programs(request, progress)
     print_result(lambda: summary_to_json(summary), lambda _: render_summary(summary), as_json=as_json)
     return ALL_MET

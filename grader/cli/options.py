@@ -108,7 +108,7 @@ def parse_percent(ctx: click.Context, param: click.Parameter, value: float | Non
     return Fraction(str(value))
 
 
-def nearest(found: str, known: Sequence[str]) -> str:
+def with_nearest(found: str, known: Sequence[str]) -> str:
     """End a message with the closest known name, or with all known names."""
     import difflib
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from grader.cli.completion import complete_output
-from grader.cli.options import nearest
+from grader.cli.options import with_nearest
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, added_formats, format_of
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def _parse_output(value: str) -> Output:
         raise click.BadParameter(f"expected FORMAT=PATH, found {value!r}{likely}")
     if format_ != EVIDENCE and format_of(format_) is None:
         raise click.BadParameter(
-            f"{format_!r} is not a format{nearest(format_, [*FORMATS, *added_formats(), EVIDENCE])}"
+            f"{format_!r} is not a format{with_nearest(format_, [*FORMATS, *added_formats(), EVIDENCE])}"
         )
     if format_ == EVIDENCE and path == "-":
         raise click.BadParameter("evidence is a folder: expected evidence=FOLDER, found evidence=-")

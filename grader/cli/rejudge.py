@@ -89,7 +89,7 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     from grader.grading.app import rejudge
     from grader.grading.evidence.store import is_evidence
-    from grader.grading.reporting.delivery import Output, prepared
+    from grader.grading.reporting.delivery import Output, prepared_outputs
 
     if any(output.format == EVIDENCE for output in outputs):
         raise click.BadParameter("evidence is kept while grading, not while judging again")
@@ -107,7 +107,7 @@ def command(  # noqa: PLR0913  one parameter an option
     one = len(evidence) == 1 and is_evidence(evidence[0])
     if one and not show_changes:
         reports = (*outputs, Output("json")) if as_json else outputs
-        code = _one(evidence[0], how, prepared(reports, verbose=verbose), min_score, for_whom)
+        code = _one(evidence[0], how, prepared_outputs(reports, verbose=verbose), min_score, for_whom)
         return _confirmed(code, 1, verify=verify)
     wanted = rejudge.Wanted(
         tuple(replace(output, verbose=verbose) for output in outputs),
@@ -131,12 +131,12 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
     """Judge one submission, and deliver its report as grading does."""
     from grader.grading.app import rejudge
     from grader.grading.evidence.store import open_evidence
-    from grader.grading.model.report import exit_code
+    from grader.grading.model.report import report_exit_code
     from grader.grading.reporting.audience import told
     from grader.grading.reporting.delivery import deliver
 
     wanted = tuple(replace(output, evidence=folder) for output in outputs)
-    report = rejudge.rejudge(open_evidence(folder), how)
+    report = rejudge.rejudge_evidence(open_evidence(folder), how)
     deliver(report, wanted, for_whom)
     if for_whom.only_students:
         pages = [output.path for output in wanted if output.format == PAGE and output.path is not None]
@@ -146,7 +146,7 @@ def _one(folder: Path, how: Judgement, outputs: Sequence[Output], min_score: Fra
             data = report_to_json(told(report, for_whom))
             _add_marks([(report.name, folder, page, data) for page in pages])
 
-    return exit_code(told(report, for_whom), min_score)
+    return report_exit_code(told(report, for_whom), min_score)
 
 
 def _class(  # noqa: PLR0913  one parameter an option
@@ -154,7 +154,12 @@ def _class(  # noqa: PLR0913  one parameter an option
 ) -> int:
     """Judge many submissions, print their results, and write one file for each submission and format."""
     from grader.grading.app import rejudge
-    from grader.grading.reporting.rejudged import render_changes, render_changes_table, render_results, results_to_json
+    from grader.grading.reporting.rejudged import (
+        rejudged_to_json,
+        render_changes,
+        render_changes_table,
+        render_rejudged,
+    )
 
     if any(output.path is None for output in wanted.files):
         raise click.BadParameter("a class has many reports: expected FORMAT=FOLDER, found FORMAT=-")
@@ -172,8 +177,8 @@ def _class(  # noqa: PLR0913  one parameter an option
             complain(f"{table} is left as it was: nothing changed", kind="note")
         else:
             write_file(table, render_changes_table(changes).encode())
-    render = render_changes if wanted.changes else render_results
-    print_result(lambda: results_to_json(results, changes=wanted.changes), lambda _: render(results), as_json=as_json)
+    render = render_changes if wanted.changes else render_rejudged
+    print_result(lambda: rejudged_to_json(results, changes=wanted.changes), lambda _: render(results), as_json=as_json)
     return _confirmed(rejudge.class_code(results), sum(not r.problem for r in results), verify=how.verify)
 
 

@@ -12,7 +12,15 @@ import click
 
 from grader.cli.completion import complete_exercise
 from grader.cli.options import PATH, RUBRIC
-from grader.grading.model.grading_options import OBSERVE, GradingOptions, Option, OptionKind, names, percent, rows
+from grader.grading.model.grading_options import (
+    OBSERVE,
+    GradingOptions,
+    Option,
+    OptionKind,
+    option_names,
+    percent,
+    rows,
+)
 
 _Command = Callable[..., int]
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -26,7 +34,7 @@ def run_options(
     def decorate(function: _Command) -> _Command:
         @wraps(function)
         def called(*arguments: Any, **given: Any) -> int:
-            values = {name: given.pop(name) for name in names(command, record)}
+            values = {name: given.pop(name) for name in option_names(command, record)}
             if "exercises" in values:
                 values["exercises"] = tuple(dict.fromkeys(values["exercises"]))
             if "student" in values:
@@ -34,7 +42,7 @@ def run_options(
             return function(*arguments, options=record(**values), **given)
 
         decorated: _Command = called
-        for name in reversed(names(command, record)):
+        for name in reversed(option_names(command, record)):
             decorated = run_option(name, command, record)(decorated)
         return decorated
 

@@ -63,7 +63,7 @@ def command(  # noqa: PLR0913  one parameter an option
     """
     require("grade selftest", "libcst", "authors")
     from grader.course.mutation.running import SelftestOptions, selftest
-    from grader.course.mutation.showing import render_results, results_to_json
+    from grader.course.mutation.showing import render_selftest, selftest_to_json
 
     # A shell pattern such as mine/*.yaml matches the notes as well.
     named = [path for path in rubrics if rubric_of(path) is None]
@@ -74,8 +74,8 @@ def command(  # noqa: PLR0913  one parameter an option
     with shown_progress(wanted=not no_progress) as progress:
         results = list(selftest(named, options, progress))
     print_result(
-        lambda: results_to_json(results),
-        lambda page: render_results(results, width=page.width, colour=page.colour),
+        lambda: selftest_to_json(results),
+        lambda page: render_selftest(results, width=page.width, colour=page.colour),
         as_json=as_json,
     )
     if write_notes:

@@ -84,11 +84,11 @@ def _upload(  # noqa: PLR0913  one parameter an option
 ) -> int:
     from grader.course.classroom.store import open_store
     from grader.course.classroom.uploading import marks
-    from grader.course.classroom.uploading.web import address_of, token_of
+    from grader.course.classroom.uploading.web import platform_address, token_of
     from grader.course.classroom.uploading.wording import render_comparison, render_sent
     from grader.runtime.model.errors import ClassError
 
-    address, token = address_of(url), token_of(variable, token_file)
+    address, token = platform_address(url), token_of(variable, token_file)
     known = marks.read_marks(results)
     with open_store(results):  # no other process grades or uploads meanwhile
         platform = connect(address, token, course, assignment)
@@ -108,7 +108,7 @@ def _upload(  # noqa: PLR0913  one parameter an option
             complain(f"nothing was sent; --send sends {needed} marks", kind="note")
             return NOT_ALL_MET if left_out else ALL_MET
         try:
-            sent = marks.send(found.changes, platform, lambda line: complain(line, kind="sent"))
+            sent = marks.send_marks(found.changes, platform, lambda line: complain(line, kind="sent"))
         except KeyboardInterrupt:
             complain("interrupted: run the same command again to send the rest", kind="note")
             return INTERRUPTED

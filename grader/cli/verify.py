@@ -17,7 +17,6 @@ from grader.cli.options import (
     shown_progress,
 )
 from grader.cli.run_options import run_options
-from grader.grading.model.conditions import CONDITIONS, TOGETHER
 from grader.grading.model.grading_options import VERIFY, GradingOptions
 from grader.runtime.model.errors import ALL_MET, NOT_ALL_MET, UNDECIDED
 
@@ -32,15 +31,6 @@ _EPILOG = (
 
 @click.command(name="verify", epilog=_EPILOG)
 @click.argument("submissions", metavar="SUBMISSION...", nargs=-1, required=True, shell_complete=complete_file)
-@click.option(
-    "--condition",
-    "conditions",
-    metavar="NAME",
-    type=click.Choice(CONDITIONS),
-    multiple=True,
-    help=f"Try only this condition ({', '.join(CONDITIONS)}); repeatable. By default all but {TOGETHER}.",
-)
-@click.option("--quick", is_flag=True, help="Try only together: order, processors, folder, zone, hashes and executed.")
 @run_options(VERIFY)
 @click.option(
     "--evidence", type=PATH, metavar="FOLDER", help="Compare with this evidence too, and keep the result in it."
@@ -51,8 +41,6 @@ _EPILOG = (
 def command(  # noqa: PLR0913  one parameter an option
     *,
     submissions: tuple[str, ...],
-    conditions: tuple[str, ...],
-    quick: bool,
     options: GradingOptions,
     evidence: Path | None,
     seed_key: Path | None,
@@ -61,14 +49,12 @@ def command(  # noqa: PLR0913  one parameter an option
 ) -> int:
     """Record a SUBMISSION several times, and tell whether the same happens each time.
 
-    Each recording after the first is made under a condition that must not matter: another order of scenarios, one
-    processor, a busy machine, another way of starting programs, temporary folder, time zone, hash seed, user, sandbox.
+    After the first recording there are three: again with nothing changed; together, with another order of scenarios,
+    one processor, another temporary folder, time zone and hash seed, and each program executed; and beside busy loops.
     They are compared event by event. The first difference is printed with its kind: time, order, content, clock, or
-    only what the grader saw. What this machine cannot do is named as not tried. Scenarios that the wall clock decides
-    are named too: they cannot be compared in this way. Nothing is judged.
+    only what the grader saw. Scenarios that the wall clock decides are named: they cannot be compared in this way.
+    Nothing is judged.
     """
-    if quick and conditions:
-        raise click.BadParameter("--quick and --condition exclude each other")
     if evidence is not None and len(submissions) != 1:
         raise click.BadParameter("--evidence is that of one submission: expected one SUBMISSION, found several")
     drawn = options.seed is not None or seed_key is not None or options.student
@@ -82,9 +68,8 @@ def command(  # noqa: PLR0913  one parameter an option
     from grader.grading.reporting.verified import render_verification, verification_to_json
 
     how = request_for("", options, seed_key=key or PRACTICE, draw=draw)
-    wanted = (TOGETHER,) if quick else conditions
     with shown_progress(wanted=not no_progress) as progress:
-        found = verify(VerifyRequest(submissions, how, wanted, evidence), progress)
+        found = verify(VerifyRequest(submissions, how, evidence), progress)
     if evidence is not None:
         _keep(found, evidence, verification_to_json(found))
     print_result(
@@ -92,10 +77,10 @@ def command(  # noqa: PLR0913  one parameter an option
         lambda page: render_verification(found, width=page.width, colour=page.colour),
         as_json=as_json,
     )
-    return exit_code(found)
+    return verification_exit_code(found)
 
 
-def exit_code(found: Verification) -> int:
+def verification_exit_code(found: Verification) -> int:
     """Return the exit code of the command for its result."""
     from grader.grading.model.verification import ConditionState
 

@@ -15,7 +15,7 @@ def write_whole(path: Path, data: bytes) -> None:
     A symbolic link stays a link, and an existing file keeps its mode. Special files, such as /dev/null or a pipe, are
     written to directly.
     """
-    target = target_of(path)
+    target = link_target(path)
     if is_special(target):
         target.write_bytes(data)
         return
@@ -39,7 +39,7 @@ def replace_file(path: Path, data: bytes, mode: int | None = None) -> None:
         raise
 
 
-def target_of(path: Path) -> Path:
+def link_target(path: Path) -> Path:
     """Return the file that is written under a path: where a link leads to."""
     return Path(os.path.realpath(path))
 

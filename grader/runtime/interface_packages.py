@@ -27,7 +27,7 @@ from grader.runtime.model.errors import EnvironmentFault, RubricError
 from grader.runtime.model.limits import MAX_NAME_BYTES
 from grader.runtime.model.packages import BroughtPackage, DescribedPackage
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.shipped import PACKAGE
 from grader.runtime.supervisor.confined_build import Build, build_confined, told_of
@@ -42,7 +42,7 @@ __all__ = [
     "InterfacePackage",
     "Provided",
     "built_from",
-    "described",
+    "course_packages",
     "is_brought",
     "modules_named",
     "offered_digest",
@@ -98,7 +98,7 @@ class Provided:
         return (*(BuiltInterfaces(prefix, ()).python for prefix in self.builds), *self.lent)
 
 
-def is_installed(name: str, ros: RosInstallation) -> bool:
+def is_package_installed(name: str, ros: RosInstallation) -> bool:
     """Return whether ROS or Python has a package of this name, so that nobody can bring one."""
     if len(os.fsencode(name)) > MAX_NAME_BYTES or "/" in name or "\0" in name:
         return False  # no folder can have it
@@ -113,7 +113,7 @@ def packages_in(folders: Iterable[Path]) -> list[InterfacePackage]:
     for folder in folders:
         here = find_packages(folder)
         if not here:
-            where = shown(str(folder), 500)
+            where = printable(str(folder), 500)
             text = f"{where}: expected an interface package, found no folder with msg, srv or action in it"
             raise RubricError(text, "a package has its files in folders msg, srv and action")
         found += here
@@ -132,14 +132,14 @@ def offers(rubric: Iterable[Path], course: Iterable[Path], ros: RosInstallation)
             if digest([known]) != digest([package]):
                 text = f"interfaces: expected one package {package.name}, found two with other definitions"
                 raise RubricError(text, "give one of them another name")
-    return [offer for offer in found.values() if not is_installed(offer.package.name, ros)]
+    return [offer for offer in found.values() if not is_package_installed(offer.package.name, ros)]
 
 
 def _digest(packages: Sequence[InterfacePackage]) -> str:
     return f"sha256:{digest(packages)}"
 
 
-def built(packages: Sequence[InterfacePackage], ros: RosInstallation) -> BuiltInterfaces:
+def built_packages(packages: Sequence[InterfacePackage], ros: RosInstallation) -> BuiltInterfaces:
     """Build packages, unless that was done before; raises DefinitionError with file and line."""
     return build(packages, kept_interfaces() or _own_temporary(), ros.share)
 
@@ -169,7 +169,7 @@ def type_folders() -> TypeFolders | None:
     except EnvironmentFault:
         return None
     ready = _ready(ros)
-    return TypeFolders(tuple(ros.share), (built(ready, ros).share,) if ready else ())
+    return TypeFolders(tuple(ros.share), (built_packages(ready, ros).share,) if ready else ())
 
 
 def built_from(folders: Iterable[Path], course: Iterable[Path] = ()) -> BuiltInterfaces | None:
@@ -179,11 +179,11 @@ def built_from(folders: Iterable[Path], course: Iterable[Path] = ()) -> BuiltInt
     """
     ros = find_ros()
     own = [offer.package for offer in offers(folders, (), ros)]
-    return built(needed(own, [*_of_class(course, ros), *_ready(ros)]), ros) if own else None
+    return built_packages(needed(own, [*_of_class(course, ros), *_ready(ros)]), ros) if own else None
 
 
 def _ready(ros: RosInstallation) -> list[InterfacePackage]:
-    return [package for package in shipped_packages() if not is_installed(package.name, ros)]
+    return [package for package in shipped_packages() if not is_package_installed(package.name, ros)]
 
 
 def _of_class(course: Iterable[Path], ros: RosInstallation) -> list[InterfacePackage]:
@@ -193,7 +193,7 @@ def _of_class(course: Iterable[Path], ros: RosInstallation) -> list[InterfacePac
 def unbuilt(workspace: Path) -> tuple[InterfacePackage, ...]:
     """Return the packages in a workspace of one's own that nobody has installed; raises DefinitionError."""
     ros = find_ros(workspaces=True)
-    return tuple(package for package in find_packages(workspace) if not is_installed(package.name, ros))
+    return tuple(package for package in find_packages(workspace) if not is_package_installed(package.name, ros))
 
 
 def is_brought(name: str) -> bool:
@@ -213,17 +213,17 @@ def modules_named(sources: Iterable[bytes], own: Sequence[InterfacePackage]) -> 
     """
     ros = find_ros(workspaces=True)
     taken = {package.name for package in own}
-    ready = [p for p in shipped_packages() if p.name not in taken and not is_installed(p.name, ros)]
+    ready = [p for p in shipped_packages() if p.name not in taken and not is_package_installed(p.name, ros)]
     names = {*(package.name for package in ready), *LENDABLE}
     mentioned = _named_in(sources, names)
-    lent = lent_to(mentioned, lambda name: is_installed(name, ros))
+    lent = lent_to(mentioned, lambda name: is_package_installed(name, ros))
     mentioned |= _named_in([lent.text], names)
     used = needed([*own, *(package for package in ready if package.name in mentioned)], ready)
-    found = [built(used, ros).python] if used else []
+    found = [built_packages(used, ros).python] if used else []
     return (*found, LENT) if lent.names else tuple(found)
 
 
-def described(course: tuple[Path, ...], *, ready: bool = True) -> list[DescribedPackage]:
+def course_packages(course: tuple[Path, ...], *, ready: bool = True) -> list[DescribedPackage]:
     """Build the packages of a course, and describe them and, if asked, those that ship with the grader.
 
     Raises EnvironmentFault without ROS, DefinitionError with file and line.
@@ -231,10 +231,10 @@ def described(course: tuple[Path, ...], *, ready: bool = True) -> list[Described
     ros = find_ros()
     given = [(package, CLASS) for package in packages_in(dict.fromkeys(course))]
     given += [(package, GRADER) for package in shipped_packages() if ready]
-    lacking = [package for package, _ in given if not is_installed(package.name, ros)]
+    lacking = [package for package, _ in given if not is_package_installed(package.name, ros)]
     found = []
     for package, origin in given:
-        place = str(built(needed([package], lacking), ros).python) if package in lacking else ""
+        place = str(built_packages(needed([package], lacking), ros).python) if package in lacking else ""
         types = tuple(sorted(f"{package.name}/{d.kind}/{d.name}" for d in package.definitions))
         found.append(DescribedPackage(package.name, origin, _digest([package]), types, place))
     return found
@@ -270,17 +270,17 @@ def provide(  # noqa: PLR0913 - who brings packages, and who needs them
     ros, root = session.ros, submission.root
     given = offers(rubric, course, ros)
     taken = {offer.package.name for offer in given}
-    ready = [p for p in shipped_packages() if p.name not in taken and not is_installed(p.name, ros)]
+    ready = [p for p in shipped_packages() if p.name not in taken and not is_package_installed(p.name, ros)]
     texts = chain([text], _programs(root))
     names = {*(package.name for package in ready), *LENDABLE}
     mentioned = _named_in(texts, names)
-    lent = lent_to(mentioned, lambda name: is_installed(name, ros))
+    lent = lent_to(mentioned, lambda name: is_package_installed(name, ros))
     mentioned |= _named_in([lent.text], names)
     named = [package for package in ready if package.name in mentioned]
     used = needed([*(offer.package for offer in given), *named], ready)
     given += [OfferedPackage(package, GRADER) for package in used if package.name not in taken]
     brought = [BroughtPackage(offer.package.name, offer.origin, _digest([offer.package])) for offer in given]
-    builds = [_copied(built(used, ros).prefix, session.folder)] if used else []
+    builds = [_copied(built_packages(used, ros).prefix, session.folder)] if used else []
     others = [*used, *(package for package in ready if package not in used)]
     given_builds = len(builds)
     own = _of_submission(session, submission, others, budget_s, build_own)
@@ -331,7 +331,7 @@ def _of_submission(
     if kept is not None:
         return _own_from(kept, place)
     names = {folder.name for path in files for folder in path.parents} | {one.name for one in submission.projects}
-    taken = {other.name for other in others} | {name for name in names if is_installed(name, session.ros)}
+    taken = {other.name for other in others} | {name for name in names if is_package_installed(name, session.ros)}
     started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="build-", dir=place.parent, ignore_cleanup_errors=True) as fresh:
         into = Path(fresh, "whole")

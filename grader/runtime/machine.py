@@ -22,9 +22,8 @@ from grader.runtime.model.releases import release_of
 from grader.runtime.outdated import BUBBLEWRAP, FAST_DDS, LINUX, kernel_version, outdated, version_of
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.bubblewrap import ENTERABLE
-from grader.runtime.sandbox.choose import Machine, inspect_tier, inspect_tiers, sandbox_memory
-from grader.runtime.sandbox.exposure import some_user
-from grader.runtime.sandbox.properties import SETTINGS_FOLDER, confined, install_command, setting_command
+from grader.runtime.sandbox.choose import Machine, inspect_tiers, sandbox_memory
+from grader.runtime.sandbox.properties import SETTINGS_FOLDER, has_filter, package_command, setting_command
 from grader.runtime.sandbox.tiers import is_for_others, isolation_from_name
 from grader.runtime.supervisor.byte_code import byte_code
 from grader.runtime.supervisor.memory_groups import group_fact
@@ -64,15 +63,6 @@ def sandboxes(ros: RosInstallation) -> tuple[TierReport, ...]:
     return inspect_tiers(Machine(ros))
 
 
-def sandbox(name: str) -> TierReport:
-    """Return the report on one sandbox, from its last test if nothing has changed since.
-
-    Raises:
-        EnvironmentFault: This machine lacks ROS.
-    """
-    return inspect_tier(name, Machine(find_ros()))
-
-
 def can_fork(name: str) -> bool:
     """Return whether students' nodes are forked in a sandbox, not executed; raises EnvironmentFault without it."""
     return isolation_from_name(name).can_fork
@@ -90,11 +80,6 @@ def easiest_remedy(tiers: Sequence[TierReport]) -> str:
     """Return the easiest fix of a sandbox; running as another user comes last, because it takes the most effort."""
     ordered = sorted(tiers, key=lambda tier: is_for_others(tier.name))
     return next((tier.remedy for tier in ordered if tier.remedy), "")
-
-
-def other_user() -> int:
-    """Return a user that no other grader on this machine uses."""
-    return some_user()
 
 
 def software(ros: RosInstallation | None) -> Iterator[Fact]:
@@ -180,7 +165,7 @@ def _fast_dds(ros: RosInstallation) -> str:
 def _bubblewrap() -> Fact:
     path = shutil.which("bwrap")
     if path is None:
-        return Fact("bubblewrap", "not installed", remedy=install_command("bubblewrap"))
+        return Fact("bubblewrap", "not installed", remedy=package_command("bubblewrap"))
     return Fact("bubblewrap", f"{_said_by(path).removeprefix('bubblewrap ')} ({path})")
 
 
@@ -202,7 +187,7 @@ def _distribution() -> str:
 def _surroundings() -> str:
     marks = {"/.dockerenv": "a Docker container", "/run/.containerenv": "a Podman container"}
     inside = next((name for path, name in marks.items() if Path(path).exists()), "")
-    filtered = "system calls filtered" if confined() else ""
+    filtered = "system calls filtered" if has_filter() else ""
     if os.environ.get("GITHUB_ACTIONS") == "true":
         inside = inside or "a GitHub Actions runner"
     known = ", ".join(part for part in (f"in {inside}" if inside else "", filtered) if part)
@@ -217,7 +202,7 @@ def namespaces(command: str, settings: Path = SETTINGS_FOLDER) -> Fact:
         settings: Where the kernel exposes its settings.
     """
     if not command:
-        filtered = ", but a filter of system calls may" if confined() else ""
+        filtered = ", but a filter of system calls may" if has_filter() else ""
         return Fact("user namespaces", f"no setting forbids them{filtered}")
     name, _, value = command.rpartition(" ")[2].partition("=")
     now = settings.joinpath(*name.split(".")).read_text(encoding="ascii").strip()

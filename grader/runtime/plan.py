@@ -22,7 +22,7 @@ from grader.runtime.model.submission import Beginning, Submission
 from grader.runtime.model.trace import Endpoint
 from grader.runtime.stimuli import KINDS
 from grader.runtime.stimuli.drawing import Draws, drawn_time
-from grader.runtime.stimuli.events import in_order
+from grader.runtime.stimuli.events import events_in_order
 from grader.runtime.stimuli.recorded import RecordedStream, Recording
 
 #: The most characters of what a process is started with, as JSON. It is handed over as one argument of a program, for
@@ -169,7 +169,7 @@ class Plan:
 
     def events(self) -> list[Event]:
         """Return what happens, sorted by time, apart from what simulations do."""
-        return in_order(event for stimulus in self.stimuli for event in stimulus.events())
+        return events_in_order(event for stimulus in self.stimuli for event in stimulus.events())
 
     def start_of(self, process: str) -> PlannedStart:
         """Return what a process is started with."""

@@ -25,7 +25,7 @@ from rclpy.serialization import deserialize_message, serialize_message  # noqa: 
 _KINDS = {"msg": "message", "srv": "service", "action": "action"}
 
 
-def type_name(kind: Any, *wanted: str) -> str:
+def message_type_name(kind: Any, *wanted: str) -> str:
     """Return the name of a message, service or action type, such as `std_msgs/msg/String`.
 
     Args:
@@ -49,7 +49,7 @@ def serialized(message: Any, where: str) -> tuple[str, bytes]:
     if isinstance(message, type):
         raise TypeError(f"{where}: expected a message, found the class {message.__name__}; write {message.__name__}()")
     try:
-        interface = type_name(type(message), "msg")
+        interface = message_type_name(type(message), "msg")
     except TypeError:
         raise TypeError(f"{where}: expected a ROS message, found {type(message).__name__}") from None
     return interface, bytes_of(message)
@@ -76,7 +76,7 @@ def type_of_part(value: Any, part: str, where: str) -> tuple[str, Any]:
     found = f"the class {value.__name__}" if isinstance(value, type) else type(value).__name__
     wrong = TypeError(f"{where}: expected a {part.lower()} such as {example}.{part}(), found {found}")
     try:
-        interface = type_name(type(value), kind)
+        interface = message_type_name(type(value), kind)
     except TypeError:
         raise wrong from None
     if isinstance(value, type):  # its metaclass is in the same module
@@ -87,7 +87,7 @@ def type_of_part(value: Any, part: str, where: str) -> tuple[str, Any]:
     return interface, made
 
 
-def read(carried: Message | Delivery) -> Any:
+def read_message(carried: Message | Delivery) -> Any:
     """Return a message that was observed as an object of its class.
 
     Raises:
@@ -101,12 +101,12 @@ def read(carried: Message | Delivery) -> Any:
     return deserialize_message(carried.cdr, kind)
 
 
-def fields_of(carried: Message | Delivery) -> Mapping[str, Any]:
+def carried_fields(carried: Message | Delivery) -> Mapping[str, Any]:
     """Return the fields of a message as plain values, for recordings; none if they cannot be read."""
     if carried.value or not carried.cdr:
         return carried.value
     try:
-        fields: Mapping[str, Any] = plain_fields(read(carried))
+        fields: Mapping[str, Any] = plain_fields(read_message(carried))
     except Exception:  # whatever bytes a program sends
         return {}
     return fields

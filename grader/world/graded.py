@@ -19,9 +19,9 @@ from typing import Any
 import pytest
 
 from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription
-from grader.grading.model.wording import listed, nearest
+from grader.grading.model.wording import first_few, nearest
 from grader.runtime.message_classes import built, message_class
-from grader.runtime.model.author_files import line_of, words_of
+from grader.runtime.model.author_files import error_words, line_of
 from grader.runtime.model.errors import GraderError, HarnessError, SubmissionError
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import Message, unmet_policy
@@ -145,7 +145,7 @@ class GradedWorld(World):
                 return Found(name, Path(self._job.plan.root), file, executable, self._job.plan.projects)
         known = [*(name for name, _, _ in self._job.files), *self._job.missing]
         close = nearest(wanted, known)
-        hint = f"did you mean {close}?" if close else f"name it under `files`, which has {listed(known)}"
+        hint = f"did you mean {close}?" if close else f"name it under `files`, which has {first_few(known)}"
         raise SubmissionError(f"{wanted}: expected a program of the rubric, found none", hint)
 
     def _found_launch_file(self, file: str | Path) -> tuple[Found, tuple[tuple[str, str], ...]]:
@@ -253,7 +253,7 @@ class Plugin:
             unknown = [name for name in marker.kwargs if name not in OPTIONS]
             if unknown or marker.args:
                 found = unknown[0] if unknown else repr(marker.args[0])
-                raise ValueError(f"@pytest.mark.ros in a rubric: expected {listed(OPTIONS)} by name, found {found}")
+                raise ValueError(f"@pytest.mark.ros in a rubric: expected {first_few(OPTIONS)} by name, found {found}")
             options |= marker.kwargs
         world = GradedWorld(self._line, self._jobs[_name(node)], options)
         node.stash[_WORLD] = world
@@ -346,7 +346,7 @@ def _mistake(error: BaseException, path: str, when: str | None = None) -> dict[s
     hint = f"; {error.hint}" if isinstance(error, GraderError) and error.hint else ""
     if isinstance(error, AttributeError) and hasattr(getattr(error, "obj", None), "get_fields_and_field_types"):
         hint = "; name the type that the messages have to be of, as in ros.messages(topic, Twist)"
-    return {"line": line_of(error, path, 0), "text": f"{where}{type(error).__name__}: {words_of(error)}{hint}"[:500]}
+    return {"line": line_of(error, path, 0), "text": f"{where}{type(error).__name__}: {error_words(error)}{hint}"[:500]}
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from grader.grading.reporting.html.render import render_run
 from grader.runtime.files import write_whole
 from grader.runtime.model.trace import Delivery, Fault, LogRecord, Message, Observation, OutputLine, Trace
 from grader.runtime.recording.recording_file import recording_bytes
-from grader.runtime.serialization import fields_of
+from grader.runtime.serialization import carried_fields
 from grader.runtime.session import RecordingSession
 
 #: Who published on a topic, in the words of a test.
@@ -61,5 +61,5 @@ def _whole(trace: Trace) -> Trace:
 
 def _with_fields(observation: Observation) -> Observation:
     if isinstance(observation, (Message, Delivery)):
-        return replace(observation, value=fields_of(observation))
+        return replace(observation, value=carried_fields(observation))
     return observation

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
-from grader.grading.model.wording import listed, nearest
+from grader.grading.model.wording import first_few, nearest
 from grader.grading.submissions.submission import read_projects
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
@@ -110,7 +110,11 @@ def _of_package(package: str, name: str, near: Sequence[Path]) -> Found:
         raise SubmissionError(text, "remove that file")
     close = nearest(f"{package}/{name}", known)
     hint = (
-        f"did you mean {close}?" if close else f"there are {listed(known)}" if known else "no package is near the test"
+        f"did you mean {close}?"
+        if close
+        else f"there are {first_few(known)}"
+        if known
+        else "no package is near the test"
     )
     raise SubmissionError(f"{package}/{name}: expected an executable of a package, found none", hint)
 
@@ -177,7 +181,7 @@ def given_parameters(
             continue
         path = next((found for folder in near if (found := folder / one).is_file()), None)
         if path is None:
-            where = listed([str(folder) for folder in near])
+            where = first_few([str(folder) for folder in near])
             raise SubmissionError(f"{os.fspath(one)}: expected a parameter file, found none", f"looked in {where}")
         files.append((path.name, path.read_text(encoding="utf-8")))
     return {}, tuple(files)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from grader.grading.model.wording import listed, moment, nearest, quote, span
+from grader.grading.model.wording import first_few, moment, nearest, quote, span
 from grader.runtime.model.trace import (
     Delivery,
     Endpoint,
@@ -88,12 +88,12 @@ def silence(graph: GraphSnapshot, topic: str, now_ns: int, other: str) -> NoMess
     nodes = sorted({end.node for end in publishers if end.topic == topic})
     if nodes:
         end = ": let time pass" if now_ns == 0 else ""
-        return NoMessage(f"{topic}: no message of {listed(nodes)} yet at {moment(now_ns)}{end}")
+        return NoMessage(f"{topic}: no message of {first_few(nodes)} yet at {moment(now_ns)}{end}")
     if other:
         return NoMessage(f"{topic}: only {other} publishes on it; these are the messages of programs")
     topics = sorted({end.topic for end in publishers})
     close = nearest(topic, topics)
-    known = f"; there are {listed(topics)}" if topics and not close else ""
+    known = f"; there are {first_few(topics)}" if topics and not close else ""
     return NoMessage(f"{topic}: no program publishes on it{known}", f"did you mean {close}?" if close else "")
 
 
@@ -160,7 +160,7 @@ def in_vain(given: Given, observations: Sequence[Observation]) -> Iterator[str]:
         hidden = old.startswith("__") or old.rpartition("/")[2] in NAMES_OF_EVERY_NODE
         if not hidden and used.isdisjoint(_resolved(new, node) for node in given.nodes):
             what = f"{program.name}: the remapping of {old} to {new} matches no topic or service of its nodes"
-            known = f"; they have {listed(sorted(used))}" if used else ""
+            known = f"; they have {first_few(sorted(used))}" if used else ""
             yield what + (_meant(_resolved(old, min(given.nodes)), used) or known)
 
 
@@ -261,7 +261,7 @@ def _by_name(pairs: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
     found: dict[str, list[str]] = {}
     for name, node in pairs:
         found.setdefault(name, []).append(node)
-    return ((name, listed(sorted(set(nodes)))) for name, nodes in sorted(found.items()))
+    return ((name, first_few(sorted(set(nodes)))) for name, nodes in sorted(found.items()))
 
 
 def meanwhile(observations: Iterable[Observation], programs: Iterable[Program], since_ns: int) -> Iterator[str]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
 
-from grader.grading.model.wording import listed, nearest
+from grader.grading.model.wording import nearest
 from grader.runtime.message_classes import built, plain_fields
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, RecordingError
@@ -37,17 +37,17 @@ from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, r
 from grader.runtime.programs.executables import package_of
 from grader.runtime.serialization import (
     QoSProfile,
+    message_type_name,
     parameter_message,
     qos_words,
-    read,
+    read_message,
     serialized,
     service_type,
-    type_name,
     type_of_part,
 )
 from grader.runtime.session import RecordingSession, SteppedRun
 from grader.runtime.simulation import Moment, Simulation, types_heard
-from grader.runtime.simulation.loading import made
+from grader.runtime.simulation.loading import made_simulation
 from grader.runtime.steps import (
     Advance,
     CallService,
@@ -579,7 +579,7 @@ class World:
         wanted = recorded if topics is None else [_absolute(topic) for topic in topics]
         if lacking := [topic for topic in wanted if topic not in types]:
             close = nearest(lacking[0], recorded)
-            hint = f"did you mean {close}?" if close else f"it has {listed(sorted(recorded))}"
+            hint = f"did you mean {close}?" if close else f"it has {first_few(sorted(recorded))}"
             raise RecordingError(f"{bag}: expected the topic {lacking[0]}, found none", hint)
         streams = [read_bag(path, topic, types[topic]) for topic in wanted]
         began_ns = min((one.began_ns for one in streams), default=0)
@@ -613,10 +613,12 @@ class World:
         """
         __tracebackhide__ = True
         name = _absolute(name)
-        interface = type_name(type, "srv")
+        interface = message_type_name(type, "srv")
         known = self._functions.get(name)
-        if known is not None and type_name(known[0]) != interface:
-            raise ValueError(f"{name}: expected {type_name(known[0])}, as it is served already, found {interface}")
+        if known is not None and message_type_name(known[0]) != interface:
+            raise ValueError(
+                f"{name}: expected {message_type_name(known[0])}, as it is served already, found {interface}"
+            )
         self._functions[name] = (service_type(interface), function)
         self._fits = False
         self._perform(Serve(name, interface))
@@ -643,7 +645,7 @@ class World:
             WrongType: A program has a client of another type.
         """
         __tracebackhide__ = True
-        name, interface = _absolute(name), type_name(type, "action")
+        name, interface = _absolute(name), message_type_name(type, "action")
         known = self._actions.get(name)
         if known is not None and known.type != interface:
             raise ValueError(f"{name}: expected {known.type}, as it is served already, found {interface}")
@@ -836,7 +838,7 @@ class World:
         """
         __tracebackhide__ = True
         if isinstance(simulation, str):
-            simulation = made(simulation, "", b"", parameters)
+            simulation = made_simulation(simulation, "", b"", parameters)
         number = len(self._simulations)
         self._simulations.append(simulation)
         simulation.begin(Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
@@ -863,7 +865,7 @@ class World:
         known = self._read.setdefault(topic, [])
         found = self._messages.get(topic, ())
         if type is not None:
-            expected = type_name(type)
+            expected = message_type_name(type)
             other = next((one.type for one in found if one.type != expected), "")
             if other:
                 raise WrongType(f"{topic}: expected messages of type {expected}, found {other}")
@@ -896,7 +898,7 @@ class World:
         return telling.no_server(self._graph, service)
 
     def _as_object(self, message: Message) -> Any:
-        return read(message)
+        return read_message(message)
 
     def rate(self, topic: str, *, last: float | None = None) -> float:
         """Return how many messages a second programs publish on a topic, from the first to the last one.
@@ -1117,7 +1119,7 @@ class World:
         if self._fits:
             return
         self._fits = True
-        served = {name: type_name(kind) for name, (kind, _) in self._functions.items()}
+        served = {name: message_type_name(kind) for name, (kind, _) in self._functions.items()}
         served |= {f"{name}/_action/send_goal": f"{one.type}_SendGoal" for name, one in self._actions.items()}
         of_test = telling.Sides(self._offers.values(), {}, served)
         for found in telling.mismatches(self._graph, [of_test, *map(telling.sides_of, self._simulations)]):

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import ast
 
-from grader.api import (
-    Case,
-    Clue,
+from grader.api import Case, Clue, Outcome, hint_rule
+from grader.api.unstable import (
     Function,
     Maker,
-    Outcome,
     Source,
     WrongLogFacts,
     argument,
     chain,
     first_line,
-    hint_rule,
     is_flag,
     last_name,
     log_call,

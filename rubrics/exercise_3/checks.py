@@ -5,18 +5,13 @@ from __future__ import annotations
 import statistics
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
 from grader.api import (
-    EXACT,
-    FAULT_KEY,
-    JITTER_NS,
-    NS_PER_MS,
-    AnswerFacts,
-    AnswerRow,
+    NS_PER_S,
     ClockKind,
     Drawing,
     Endpoint,
@@ -24,18 +19,32 @@ from grader.api import (
     FieldOf,
     Finding,
     HarnessError,
-    Held,
+    Level,
     LogRecord,
     OutputLine,
+    Plot,
     Problem,
     ProblemKind,
     Reading,
     Roles,
     Trace,
-    counted,
     delivered_numbers,
     explain_fault,
     explain_no_message,
+    met,
+    not_met,
+    published,
+    published_numbers,
+    seconds,
+    within,
+)
+from grader.api.unstable import (
+    EXACT,
+    FAULT_KEY,
+    JITTER_NS,
+    NS_PER_MS,
+    Held,
+    counted,
     fault_hint,
     fault_sentence,
     faulted,
@@ -43,23 +52,13 @@ from grader.api import (
     heard_from_ns,
     held,
     in_unit,
-    lag_ns,
-    last_of_instant,
-    met,
     moment,
-    not_met,
     number,
     numbers,
-    published,
-    published_numbers,
     quote,
-    seconds,
     span,
-    steps_behind,
     student_endpoints,
-    threshold_drawing,
     unmet_policy,
-    within,
 )
 
 #: How long after a new input the answer to the previous one is still accepted.
@@ -70,6 +69,33 @@ _LONGEST_GRACE_NS = 1_200 * NS_PER_MS
 _REPEATING_NS = 1_200 * NS_PER_MS
 #: With this many answers, and this share of them at the instant of an input, the controller does not use a timer.
 _FEWEST_AT_ONCE, _SHARE_AT_ONCE = 10, 0.97
+#: Step between the lags that are tried, and the longest lag.
+_LAG_STEP_NS, _LONGEST_LAG_NS = 100 * NS_PER_MS, 8 * NS_PER_S
+#: Maximum number of inputs that an answer may lag behind.
+_FURTHEST_BEHIND = 25
+#: Minimum share of answers that must fit for a lag to be reported.
+_SURE_BEHIND = 0.97
+#: Fewer answers than this may fit by chance.
+_FEWEST_ANSWERS = 10
+#: Whether an answer (first) is right for an input (second).
+_Right = Callable[[float, float], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerRow:
+    """One input that was held for some time, and the answer to it."""
+
+    input: float
+    answer: float | None  # the last answer while it was held; None for none
+    expected: float
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerFacts:
+    """The answers of a controller that are wrong."""
+
+    rows: tuple[AnswerRow, ...] = ()  # in the order of the inputs, if each one was held for some time
+    late: bool = False  # whether each answer fits an earlier input
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +153,7 @@ class ThresholdResponse:
         if not mine:
             return self._nothing_asked(trace)
         every = published_numbers(trace, self.output, self.output_field)
-        answers = last_of_instant(every)
+        answers = _last_of_instant(every)
         if not answers:
             type_ = messages[0].type
             reason, problem = f"{self.output}: {quote(type_)} carries no number", ProblemKind.NO_NUMBER
@@ -171,7 +197,7 @@ class ThresholdResponse:
         if during:
             bad = self._unsettled(asked, during, before)
             return None if bad is None else _Violation(bad.t_ns, asked, bad.value)
-        if not before or _repeats(last_of_instant(answers)) or any(f.t_ns <= asked.start_ns for f in trace.faults()):
+        if not before or _repeats(_last_of_instant(answers)) or any(f.t_ns <= asked.start_ns for f in trace.faults()):
             return _Violation(asked.start_ns, asked, None)
         carried = before[-1].value
         return None if self._right(carried, asked.value) else _Violation(asked.start_ns, asked, carried)
@@ -211,7 +237,7 @@ class ThresholdResponse:
         evidence: dict[str, object],
     ) -> Finding:
         first = violations[0]
-        answers = last_of_instant(every)
+        answers = _last_of_instant(every)
         unit = in_unit(self.unit)
         wanted = number(self._expected(first.held.value))
         found = "no answer" if first.got is None else number(first.got)
@@ -225,7 +251,7 @@ class ThresholdResponse:
             cause = f"; {' and '.join(map(number, sorted(both)))} are published at the same time"
             hint = f"publish one answer to each number on {self.input}"
             return not_met(reason + cause, evidence, hint=hint, problem=ProblemKind.CONTRADICTION, brief=brief)
-        lag = lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
+        lag = _lag_ns([Reading(h.start_ns, h.value) for h in inputs], answers, self._right)
         if lag is not None:
             reason += f"; the answers match what was published {span(lag)} earlier"
             hint = f"answer the newest message on {self.input}"
@@ -298,7 +324,7 @@ class ThresholdResponse:
         """Return the inputs of the controller with its threshold, and its answers with the expected ones."""
         expected = [Reading(h.start_ns, self._expected(h.value)) for h in held(trace, self.input, self.input_field)]
         expected += [Reading(trace.stop_ns, r.value) for r in expected[-1:]]
-        return threshold_drawing(self, expected)
+        return _drawing(self, expected)
 
 
 def _deaf(subscriptions: Sequence[Endpoint]) -> str:
@@ -413,7 +439,7 @@ class AnswersTogether:
                 type_, problem = messages[0].type, Problem(ProblemKind.NO_NUMBER, (topic,))
                 return not_met(f"{topic}: {quote(type_)} carries no number", {"type": type_}, problem=problem)
         inputs = published_numbers(trace, self.input, self.input_field)
-        answers = last_of_instant(published_numbers(trace, self.output, self.output_field))
+        answers = _last_of_instant(published_numbers(trace, self.output, self.output_field))
         evidence = self._evidence(inputs, answers)
         return (
             self._contradictory(trace, inputs, evidence)
@@ -491,7 +517,7 @@ class AnswersTogether:
         self, reason: str, inputs: Sequence[Reading], answers: Sequence[Reading], evidence: Mapping[str, float]
     ) -> Finding:
         """Return that an answer is wrong, and by how much the answers lag if that explains all of them."""
-        behind = steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
+        behind = _steps_behind(inputs, answers, lambda got, value: within(got, self._expected(value), EXACT))
         if not behind:
             return not_met(reason, evidence, problem=self._wrong)
         reason += f"; the answers fit the input of {counted(behind, 'message')} earlier"
@@ -588,7 +614,7 @@ class AnswersTogether:
         expected = [
             Reading(r.t_ns, self._expected(r.value)) for r in published_numbers(trace, self.input, self.input_field)
         ]
-        return threshold_drawing(self, expected)
+        return _drawing(self, expected)
 
 
 def _usual_gap(answers: Sequence[Reading]) -> int:
@@ -664,6 +690,54 @@ def _file_of(trace: Trace, endpoint: Endpoint) -> str:
     written: list[LogRecord | OutputLine | Fault] = [*trace.records(), *trace.lines(), *trace.faults()]
     named = (o.process for o in written if o.process.removesuffix(".py") == bare.rsplit(".", 1)[-1])
     return next(named, "")
+
+
+def _lag_ns(inputs: Sequence[Reading], answers: Sequence[Reading], right: _Right) -> int | None:
+    """Return by how much the answers lag behind the inputs that they are right for; None if they do not."""
+    found: int | None = None
+    for lag in range(0, _LONGEST_LAG_NS + 1, _LAG_STEP_NS):
+        fits = _fit(inputs, answers, right, lag)
+        if fits and lag == 0:
+            return None
+        if fits:
+            found = lag
+        elif found is not None:
+            break
+    return found
+
+
+def _fit(inputs: Sequence[Reading], answers: Sequence[Reading], right: _Right, lag: int) -> bool:
+    times = [r.t_ns for r in inputs]
+    asked = [
+        (a.value, inputs[bisect_right(times, a.t_ns - lag) - 1].value) for a in answers if a.t_ns - lag >= times[0]
+    ]
+    changes = len({got for got, _ in asked}) > 1
+    return len(asked) >= _FEWEST_ANSWERS and changes and all(right(got, value) for got, value in asked)
+
+
+def _steps_behind(inputs: Sequence[Reading], answers: Sequence[Reading], right: _Right) -> int:
+    """Return how many inputs back the input is that nearly every answer is right for; 0 if there is none."""
+    times = [r.t_ns for r in inputs]
+    newest = [(a.value, bisect_right(times, a.t_ns) - 1) for a in answers]
+    for behind in range(_FURTHEST_BEHIND + 1):
+        asked = [(got, inputs[place - behind].value) for got, place in newest if place >= behind]
+        if len(asked) < _FEWEST_ANSWERS or len({got for got, _ in asked}) < 2:
+            return 0
+        if sum(right(got, value) for got, value in asked) >= _SURE_BEHIND * len(asked):
+            return behind
+    return 0
+
+
+def _last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
+    """Return one reading per instant: the last one."""
+    return tuple({r.t_ns: r for r in series}.values())
+
+
+def _drawing(check: ThresholdResponse | AnswersTogether, expected: Sequence[Reading]) -> Drawing:
+    """Return the inputs of a controller with its threshold, above its answers with the expected ones."""
+    level = Level(check.threshold, f"{number(check.threshold)}{in_unit(check.unit)}", name="threshold")
+    heard = Plot(check.input, levels=(level,), unit=check.unit)
+    return Drawing((heard, Plot(check.output, expected=tuple(expected))))
 
 
 CHECKS = {"threshold_response": ThresholdResponse, "answers_together": AnswersTogether}

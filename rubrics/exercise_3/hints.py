@@ -8,24 +8,28 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from grader.api import (
-    EXACT,
-    AnswerFacts,
-    AnswerRow,
     Case,
     Clue,
     Outcome,
     ProblemKind,
+    hint_rule,
+    published,
+    published_numbers,
+    within,
+)
+from grader.api.unstable import (
+    EXACT,
     Source,
     Switch,
     chain,
     conditions,
-    constant,
+    constant_value,
     draws,
     first_line,
     given_leaf,
-    hint_rule,
     is_flag,
     last_name,
+    literal_text,
     made,
     made_for,
     names_in,
@@ -33,17 +37,13 @@ from grader.api import (
     number_in_code,
     pauses,
     publish_calls,
-    published,
-    published_numbers,
     received,
     runs,
     silent_topic,
     subtree,
     switches,
     text_comparisons,
-    text_of,
     timer_code,
-    within,
 )
 
 #: The checks that are explained here.
@@ -83,8 +83,7 @@ def _subscribers(case: Case) -> Iterator[_Subscriber]:
 
 def _late(case: Case) -> _Subscriber | None:
     """Return the controller, if its answers are late."""
-    facts = case.found(AnswerFacts)
-    return next(_subscribers(case), None) if facts is not None and facts.late else None
+    return next(_subscribers(case), None) if getattr(case.facts, "late", False) else None
 
 
 def _compared(case: Case) -> Iterator[tuple[Source, ast.Compare]]:
@@ -101,9 +100,9 @@ def _controller(case: Case) -> _Controller | None:
     return _Controller(case, owners[0], check) if len(owners) == 1 else None
 
 
-def _rows(case: Case) -> tuple[AnswerRow, ...]:
-    facts = case.found(AnswerFacts)
-    return () if facts is None else facts.rows
+def _rows(case: Case) -> tuple[Any, ...]:
+    """Return the inputs with the answers to them, if the check tells them: each an `AnswerRow` of `checks.py`."""
+    return getattr(case.facts, "rows", ())
 
 
 def _wrong_inputs(case: Case) -> list[float]:
@@ -178,7 +177,7 @@ def _compared_mean(case: Case) -> Clue | None:
         for node in subtree(test):
             counted = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) and _sum_by_count(node)
             averaged = isinstance(node, ast.Call) and last_name(node.func) in _MEANS
-            if (counted or averaged) and text_of(node) is None:
+            if (counted or averaged) and literal_text(node) is None:
                 hint = f"{source.code(node, 50)} combines several values: compare only the newest"
                 return Clue(hint, source.place(test), key="of_many")
     return None
@@ -243,7 +242,7 @@ def _says_inverted(source: Source, switch: Switch, check: Any) -> bool:
     if choice is None:
         return False
     body = choice.body if isinstance(choice, ast.If) else [choice.body]
-    numbers = {c.value for part in body for n in subtree(part) if (c := constant(source, n)) is not None}
+    numbers = {c.value for part in body for n in subtree(part) if (c := constant_value(source, n)) is not None}
     right, wrong = check.above, check.otherwise
     if isinstance(switch.op, (ast.Lt, ast.LtE)) != negated:
         right, wrong = wrong, right
@@ -319,7 +318,7 @@ def _is_worth(source: Source, node: ast.AST, value: float) -> bool:
     if not isinstance(expression, ast.expr):
         return False
     # only the number itself, not a name for it: otherwise one mistake would be found at two places
-    worth = constant(source, expression) if not isinstance(expression, (ast.Name, ast.Attribute)) else None
+    worth = constant_value(source, expression) if not isinstance(expression, (ast.Name, ast.Attribute)) else None
     return worth is not None and within(worth.value, value, EXACT)
 
 
@@ -439,7 +438,7 @@ def _no_other_side(controller: _Controller) -> Clue | None:
     places = [a for a in given_leaf(source, "data") if isinstance(a, ast.Assign)]
     if len(places) != 1:
         return None
-    worth, test = constant(source, places[0].value), next(source.around(places[0], ast.If), None)
+    worth, test = constant_value(source, places[0].value), next(source.around(places[0], ast.If), None)
     sent = publish_calls(source, made_for(source, "publisher", check.output))
     if test is not None and any(test in list(source.around(c, ast.If)) for c in sent):
         return None
@@ -487,7 +486,7 @@ def _slow_timer(controller: _Controller) -> Clue | None:
     source, check = controller.source, controller.check
     calls = publish_calls(source, made_for(source, "publisher", check.output))
     for item in made(source, "timer"):
-        worth = constant(source, item.period)
+        worth = constant_value(source, item.period)
         inside = set(runs(source, item))
         if worth is not None and worth.value > 1.25 and all(c in inside for c in calls):
             slow = f"{timer_code(source, item)} answers every {number(worth.value)} s only"

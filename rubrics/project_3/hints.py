@@ -5,23 +5,18 @@ from __future__ import annotations
 import ast
 from dataclasses import dataclass
 
-from grader.api import (
-    Case,
-    Clue,
+from grader.api import Case, Clue, LogRecord, Outcome, ProblemKind, calls_of, hint_rule
+from grader.api.unstable import (
     Function,
-    LogRecord,
-    Outcome,
-    ProblemKind,
     Source,
     Switch,
     argument,
-    calls_of,
     chain,
     first_line,
     given_leaf,
-    hint_rule,
     is_log,
     last_name,
+    literal_text,
     number,
     number_in_code,
     pauses,
@@ -30,7 +25,6 @@ from grader.api import (
     subtree,
     switches,
     text_comparisons,
-    text_of,
 )
 
 
@@ -184,9 +178,9 @@ def _with_decimals(source: Source, node: ast.expr) -> str:
         return code if isinstance(inner, ast.Call) and chain(inner.func) == "float" else f"float({code})"
     if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Call):
         call = node.value
-        cut = last_name(call.func) in ("split", "partition") and text_of(argument(call, 0, "sep")) == "."
+        cut = last_name(call.func) in ("split", "partition") and literal_text(argument(call, 0, "sep")) == "."
         return source.code(call.func.value, 40) if cut and isinstance(call.func, ast.Attribute) else ""
-    pattern = text_of(node)
+    pattern = literal_text(node)
     asked = source.parents.get(node)
     used = isinstance(asked, ast.Call) and source.resolved(asked.func).startswith("re.")
     digits = next((d for d in _DIGITS if pattern is not None and d in pattern), "")

@@ -21,7 +21,7 @@ from tiers import LONG, NIGHTLY
 from waiting import wait_for
 
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade
+from grader.grading.app.start import grade_once
 from grader.grading.model.report import Report
 
 #: What these are told depends on where a loop stood when it was stopped.
@@ -75,7 +75,7 @@ def test_a_submission_gets_what_it_is_worth(folder: str) -> None:
 
 def test_the_reference_solutions_score_full_on_the_virtual_clock() -> None:
     """All that the exercises ask can be done, and needs no wall clock."""
-    report = grade(GradeRequest(str(ROOT / "reference_solutions"), clock="virtual"), say_nothing)
+    report = grade_once(GradeRequest(str(ROOT / "reference_solutions"), clock="virtual"), say_nothing)
     assert outcomes(report) == {}
     assert (report.score, report.max_score, report.final) == (100, 100, True)
 
@@ -92,7 +92,7 @@ def test_the_template_runs_and_earns_nothing_yet() -> None:
 def test_the_wall_clock_gives_the_same_verdict() -> None:
     """A correct publisher is correct on either clock; the report says which one it was."""
     request = GradeRequest(str(ROOT / "reference_solutions"), exercises=("velocity_publisher",), clock="wall")
-    report = grade(request, say_nothing)
+    report = grade_once(request, say_nothing)
     assert report.exercises[0].clock.value == "wall"
     lost = {i: o for i, o in outcomes(report).items() if o != "undecided"}  # a busy machine decides nothing
     assert lost == {}

@@ -44,7 +44,7 @@ class Session:
         self.opened_for.append(request)
         return nullcontext()
 
-    def grade(
+    def grade_once(
         self, request: GradeRequest, progress: Callable[[str], None], *_: object, pictures: bool, session: object
     ) -> Report:
         self.requests.append(request)
@@ -456,7 +456,7 @@ def test_a_save_is_noticed_however_it_is_made(tmp_path: Path, change: Callable[[
 )
 def test_only_programs_are_a_reason_to_grade_again(name: str, only: str | None, counts: bool) -> None:
     """Not the page that grading itself writes, nor what editors leave behind."""
-    assert interactive.is_program(name, only) is counts
+    assert interactive.is_reason(name, only) is counts
 
 
 # --- whole processes -------------------------------------------------------------------------------------------------
@@ -471,7 +471,7 @@ from grader.cli.interactive import process_start
 class Stub:
     def opened_early(self, *_):
         return nullcontext()
-    def grade(self, request, progress, *_, **__):
+    def grade_once(self, request, progress, *_, **__):
         progress("exercise 1: \\x1b[31malone")
         sys.stdin.readline()
         return a_report()

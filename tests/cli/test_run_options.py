@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from grader.cli.remembered import KEPT
 from grader.cli.run_options import run_options
-from grader.course.classroom.messages import Terms, pack, unpack
+from grader.course.classroom.messages import Terms, pack_message, unpack_message
 from grader.course.classroom.store import Conditions
 from grader.grading.app.request import GradeRequest, command_words, request_for, request_to_json
 from grader.grading.model import grading_options as module
@@ -26,7 +26,7 @@ from grader.grading.model.grading_options import (
     Keyed,
     OptionKind,
     key_values,
-    names,
+    option_names,
     option_words,
     options_of_json,
     options_to_json,
@@ -92,8 +92,8 @@ def test_the_words_of_the_command_are_read_as_what_they_were_made_of() -> None:
 def test_a_class_has_defaults_of_its_own_and_no_student() -> None:
     """Everybody's variant follows from the roster, and everybody is checked."""
     assert given(BATCH) == GradingOptions(spot_checks=1.0)
-    assert set(names(BATCH)) == set(names(GRADE)) - {"student"}
-    assert set(names(BATCH)) <= set(KEPT)  # the next run repeats them
+    assert set(option_names(BATCH)) == set(option_names(GRADE)) - {"student"}
+    assert set(option_names(BATCH)) <= set(KEPT)  # the next run repeats them
 
 
 def test_evidence_keeps_what_decides_a_recording() -> None:
@@ -118,7 +118,7 @@ def test_all_of_them_travel() -> None:
     odd = Path("\udcff.yaml")
     options = GradingOptions(**{**OTHER, "rubrics": (odd,)})
     terms = Terms(Conditions("0", (), "", options), (), standalone=False, deadline_s=1.0)
-    assert unpack(pack(terms), Terms) == terms
+    assert unpack_message(pack_message(terms), Terms) == terms
     line = json.loads(json.dumps(msgspec.to_builtins(options, enc_hook=str)))
     assert msgspec.convert(line, GradingOptions, dec_hook=lambda kind, value: kind(value)) == options
     assert odd in paths(options)

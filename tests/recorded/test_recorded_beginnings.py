@@ -13,11 +13,11 @@ from sample_folders import expected
 
 from grader.grading.evidence import manifest as kept
 from grader.grading.evidence.store import run_from
-from grader.grading.judging.agreement import start_of
+from grader.grading.judging.agreement import observation_start
 from grader.grading.judging.beginnings import CUTS_NS, BeginningJudge, Comparison, cut
 from grader.runtime.model.quantities import NS_PER_MS
 from grader.runtime.model.trace import ClockKind, LogRecord, Message, Observation, OutputLine, Request, Response, Trace
-from grader.runtime.recording.packed import unpack
+from grader.runtime.recording.packed import unpack_trace
 
 #: How late what a node does is noticed at most, and how long messages are lost at the start.
 LATE_NS, LOST_NS = 25 * NS_PER_MS, 300 * NS_PER_MS
@@ -25,10 +25,10 @@ LATE_NS, LOST_NS = 25 * NS_PER_MS, 300 * NS_PER_MS
 
 def scenarios(recorded: Recorded) -> Iterator[tuple[str, BeginningJudge, Trace, str]]:
     """Yield what was recorded in virtual time: its name, its judge, the trace, and the topic that it begins with."""
-    manifest = kept.parse(recorded.manifest)
+    manifest = kept.parse_manifest(recorded.manifest)
     exercises = [exercises_by_id()[exercise.id] for exercise in manifest.exercises]
     traces = {
-        (exercise.id, recording.scenario): unpack(recorded.traces[f"{exercise.id}.{recording.scenario}"])
+        (exercise.id, recording.scenario): unpack_trace(recorded.traces[f"{exercise.id}.{recording.scenario}"])
         for exercise in manifest.exercises
         for recording in exercise.recordings
         if recording.digest is not None
@@ -46,7 +46,7 @@ def begins_ns(trace: Trace, first_message_on: str) -> int:
     """Return when the program has something to do."""
     given = [mark.t_ns for name in ("stream_starts", "server_starts") for mark in trace.marks(name)]
     given += [request.t_ns for request in trace.of(Request) if request.sender == "grader"]
-    return start_of(trace, first_message_on) if first_message_on else min(given, default=0)
+    return observation_start(trace, first_message_on) if first_message_on else min(given, default=0)
 
 
 def on_a_real_clock(trace: Trace, seed: int) -> Trace:
@@ -81,7 +81,7 @@ def test_no_correct_submission_loses_a_criterion_to_a_real_clock() -> None:
             begin_ns = begins_ns(trace, first_message_on)
             for seed in range(2):
                 wall = on_a_real_clock(trace, seed)
-                start_ns = start_of(trace, first_message_on), start_of(wall, first_message_on)
+                start_ns = observation_start(trace, first_message_on), observation_start(wall, first_message_on)
                 stop_ns = start_ns[1] + begin_ns - start_ns[0] + length_ns
                 found = judge.compare(trace, cut(wall, stop_ns), start_ns)
                 lost += [f"{folder} {name}: {found}"] if found != Comparison() else []

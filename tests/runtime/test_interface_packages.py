@@ -25,9 +25,9 @@ from grader.cli import main
 from grader.course.classroom.store import Conditions
 from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.keeping import EvidenceWriter
-from grader.grading.app.rejudge import judgement, rejudge
+from grader.grading.app.rejudge import judgement, rejudge_evidence
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade
+from grader.grading.app.start import grade_once
 from grader.grading.evidence.store import open_evidence
 from grader.grading.model.grading_options import GradingOptions
 from grader.grading.model.report import Report
@@ -63,7 +63,7 @@ def graded(folder: Path, evidence: Path | None = None, **options: Any) -> Report
     """Grade a folder by the rubric that brings packages, and keep its evidence if asked."""
     request = GradeRequest(str(folder), rubrics=(RUBRIC_FILE,), seed=7, **options)
     writer = None if evidence is None else EvidenceWriter([evidence], request)
-    report = grade(request, say_nothing, None if writer is None else writer.remember)
+    report = grade_once(request, say_nothing, None if writer is None else writer.remember)
     if writer is not None:
         writer.write(report)
     return report
@@ -124,7 +124,7 @@ def test_other_tools_read_brought_types_in_the_evidence(kept: tuple[Report, Path
     assert battery.header.frame_id == "rack"  # type: ignore[attr-defined]
     assert list(found["/note own_msgs/msg/Note"].numbers) == [1, -2]  # type: ignore[attr-defined]
     assert "/tf tf2_msgs/msg/TFMessage" in found
-    again = rejudge(open_evidence(folder), judgement((), (RUBRIC_FILE,), verify=True))
+    again = rejudge_evidence(open_evidence(folder), judgement((), (RUBRIC_FILE,), verify=True))
     assert report_to_json(again)["exercises"] == report_to_json(report)["exercises"]
     assert again.interfaces == report.interfaces
 

@@ -20,7 +20,7 @@ from grader.grading.model.chart import Chart, Panel, Series
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import Report
 from grader.grading.rubrics.builtin import builtin_exercises
-from grader.runtime.recording.packed import unpack
+from grader.runtime.recording.packed import unpack_trace
 from grader.runtime.recording.recording_file import packed_trace
 
 #: The seed of all recordings and golden texts.
@@ -107,7 +107,7 @@ def outdated(recorded: Recorded) -> list[str]:
     exercises = exercises_by_id()
     return [
         f"{exercise.id}.{recording.scenario}"
-        for exercise in kept.parse(recorded.manifest).exercises
+        for exercise in kept.parse_manifest(recorded.manifest).exercises
         for recording in exercise.recordings
         if recording.asked
         not in [kept.scenario_digest(s) for s in exercises[exercise.id].scenarios if s.id == recording.scenario]
@@ -116,10 +116,10 @@ def outdated(recorded: Recorded) -> list[str]:
 
 def judged(recorded: Recorded, known: Mapping[str, Exercise] | None = None) -> Report:
     """Judge a recording as `grade rejudge` does, by the built-in exercises or by others, by id."""
-    manifest = kept.parse(recorded.manifest)
+    manifest = kept.parse_manifest(recorded.manifest)
     exercises = [(known or exercises_by_id())[exercise.id] for exercise in manifest.exercises]
     traces = {
-        (exercise.id, recording.scenario): unpack(recorded.traces[f"{exercise.id}.{recording.scenario}"])
+        (exercise.id, recording.scenario): unpack_trace(recorded.traces[f"{exercise.id}.{recording.scenario}"])
         for exercise in manifest.exercises
         for recording in exercise.recordings
         if recording.digest is not None

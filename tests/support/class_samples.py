@@ -12,7 +12,7 @@ from typing import Any
 from grader.course.classroom.grading import ClassRequest
 from grader.course.classroom.local import Attempt, Task
 from grader.course.classroom.outputs import Graded
-from grader.course.classroom.store import ResultStatus, State, dump, unusable_digest
+from grader.course.classroom.store import ResultStatus, State, dump_status, unusable_digest
 from grader.course.classroom.watching import Watcher
 from grader.grading.app.request import GradeRequest
 from grader.grading.submissions.submission import stage_submission
@@ -20,7 +20,7 @@ from grader.runtime.model.errors import SubmissionError
 
 GRADING = GradeRequest("", exercises=("velocity_publisher",))
 #: The status that a process which stands in for the grader reports.
-DONE = json.loads(dump(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
+DONE = json.loads(dump_status(ResultStatus(State.GRADED, "k", "d", "l", score=1.0, max_score=2.0)))
 #: Grades one submission after the other, and tells its process as a step; fails or ends if the label says so.
 LASTING = f"""
 import json, os, sys
@@ -126,3 +126,12 @@ def scores(graded: Graded) -> dict[str, Fraction | None]:
 
 
 POINTS = Fraction
+
+
+def without_line(results: Path, option: str) -> None:
+    """Leave an option of a class out: delete its line in `class.yaml`."""
+    path = results / "class.yaml"
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    kept = [line for line in lines if not line.startswith(f"{option}:")]
+    assert len(kept) == len(lines) - 1
+    path.write_text("".join(kept), encoding="utf-8")

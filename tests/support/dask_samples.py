@@ -13,7 +13,7 @@ from typing import Any
 from grader import __version__
 from grader.course.classroom import store as kept
 from grader.course.classroom.local import Task
-from grader.course.classroom.messages import Fitness, GradingJob, JobResult, pack, unpack
+from grader.course.classroom.messages import Fitness, GradingJob, JobResult, pack_message, unpack_message
 from grader.course.classroom.store import Conditions, ResultStatus, State
 from grader.grading.model.grading_options import GradingOptions
 
@@ -47,7 +47,7 @@ def graded(
     """Return an answer with a result."""
     key = CONDITIONS.key("sha256:2") if key is None else key
     status = ResultStatus(State.GRADED, key, "sha256:2", name, score=score, max_score=10.0)
-    return JobResult(machine, kept.dump(status), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
+    return JobResult(machine, kept.dump_status(status), ((b"report.json", b"{}"), (b"evidence/a.mcap", b"x")))
 
 
 class FakeFuture:
@@ -111,7 +111,7 @@ class FakeClient:
         if function.__name__ == "version":
             return {w: self.versions.get(w, __version__) for w in workers}
         found = {w: self.fitness.get(w, Fitness(f"worker {w} on lab")) for w in workers}
-        return {w: pack(fit) if isinstance(fit, Fitness) else fit for w, fit in found.items()}
+        return {w: pack_message(fit) if isinstance(fit, Fitness) else fit for w, fit in found.items()}
 
     def submit(
         self,
@@ -128,11 +128,11 @@ class FakeClient:
         assert pure is False
         assert key not in self.keys
         self.keys.append(key)
-        name = unpack(errand.data if isinstance(errand, SimpleNamespace) else errand, GradingJob).name
+        name = unpack_message(errand.data if isinstance(errand, SimpleNamespace) else errand, GradingJob).name
         self.sent.append(name)
         said = self.answers(name, workers)
         if isinstance(said, JobResult):
-            return FakeFuture(key, "finished", pack(said))
+            return FakeFuture(key, "finished", pack_message(said))
         if isinstance(said, Exception):
             return FakeFuture(key, "error", said)
         return FakeFuture(key, said, None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.grading.app.grade import Progress
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade
+from grader.grading.app.start import grade_once
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import Report, Verdict
 
@@ -19,7 +19,7 @@ def say_nothing(step: str) -> None:
 def grade_until_decided(request: GradeRequest, hear: Progress = say_nothing) -> Report:
     """Grade a submission, again where the machine was too busy for the wall clock."""
     for _ in range(ATTEMPTS):
-        report = grade(request, hear, pictures=False)
+        report = grade_once(request, hear, pictures=False)
         if not was_too_busy(report):
             break
     return report

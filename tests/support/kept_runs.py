@@ -11,7 +11,7 @@ from typing import Any
 from hypothesis import strategies as st
 from places import ROOT
 
-from grader.grading.evidence.store import keep
+from grader.grading.evidence.store import keep_run
 from grader.grading.judging.judge_run import judge_run
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import Environment, Report, Reproduction
@@ -163,5 +163,5 @@ def kept_run(folder: Path, run: Run, exercise: Exercise | None = None) -> Report
     report = judge_run(
         exercises, replace(run, reproduce=Reproduction(rubrics=((exercises[0].id, exercises[0].digest),)))
     )
-    keep(folder, run, exercises, request={}, report=dumps(report).encode())
+    keep_run(folder, run, exercises, request={}, report=dumps(report).encode())
     return report

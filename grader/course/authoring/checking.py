@@ -15,7 +15,7 @@ from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.test_files import collect_tests
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.tested import TESTED
-from grader.grading.model.exercise import Criterion, Exercise, named, roles_of
+from grader.grading.model.exercise import Criterion, Exercise, roles_of, texts_under
 from grader.grading.rubrics.check_parameters import manual_of
 from grader.grading.rubrics.draws import First
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric
@@ -25,7 +25,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError, RecordingError, RubricError
 from grader.runtime.model.quantities import duration
 from grader.runtime.model.scenario import Scenario, is_launch_file, shortest
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.stimuli import RecordedStream, Simulated
 
 #: The points of a rubric should add up to a multiple of this, for easy arithmetic.
@@ -91,7 +91,7 @@ def _of_inputs(criterion: Criterion, exercise: Exercise, path: TreePath, tree: Y
         known = set() if roles.given else own
         if asked not in given | known and not any(end[:1] == "~" and asked.endswith(end[1:]) for end in given):
             what = "publishes on" if parameter in (*roles.given, *roles.hears) else "uses"
-            text = f"no stimulus of {scenario.id} {what} {shown(asked)}{_did_you_mean(asked, given)}"
+            text = f"no stimulus of {scenario.id} {what} {printable(asked)}{_did_you_mean(asked, given)}"
             yield tree.at((*path, "check", name, parameter)).mistake(text)
 
 
@@ -99,13 +99,13 @@ def _needed(criterion: Criterion) -> tuple[str, ...]:
     """Return the parameters whose topics, services and actions another program or the grader has to use."""
     roles = roles_of(type(criterion.check))
     asked = () if criterion.check_name in _SEEN else (*roles.hears, *roles.serves, *roles.calls, *roles.actions)
-    return tuple(parameter for parameter in asked if named(criterion.check, parameter))
+    return tuple(parameter for parameter in asked if texts_under(criterion.check, parameter))
 
 
 def _published(criterion: Criterion) -> Iterator[str]:
     """Yield the topics that a criterion expects the student's nodes to publish on."""
     other = (*roles_of(type(criterion.check)).given, *_needed(criterion))
-    yield from named(criterion.check, *(parameter for parameter in ("topic", "output") if parameter not in other))
+    yield from texts_under(criterion.check, *(parameter for parameter in ("topic", "output") if parameter not in other))
 
 
 def _given(scenario: Scenario) -> set[str]:
@@ -141,7 +141,7 @@ def _misspelt(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
             for name in sorted(own - named):
                 hint = _did_you_mean(name, named - used)
                 if hint:
-                    yield tree.at(place).mistake(f"no criterion uses {shown(name)}{hint}")
+                    yield tree.at(place).mistake(f"no criterion uses {printable(name)}{hint}")
 
 
 def _heard(scenario: Scenario) -> set[str]:
@@ -150,7 +150,7 @@ def _heard(scenario: Scenario) -> set[str]:
 
 def _did_you_mean(name: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(name, sorted(known), n=1, cutoff=_ALIKE)
-    return f": did you mean {shown(near[0])}?" if near else ""
+    return f": did you mean {printable(near[0])}?" if near else ""
 
 
 def _of_stretches(criterion: Criterion, scenario: Scenario, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -179,7 +179,7 @@ def check_rubric(path: Path, course: tuple[Path, ...] = ()) -> Checked:
     exercise = read_rubric(path, draw=First(), interfaces=known_interfaces(course))
     _read_recordings(path, exercise)
     collect_tests(path, exercise, course)
-    where = shown(str(path), 500)
+    where = printable(str(path), 500)
     odd = oddities(exercise, read_yaml(path.read_text(encoding="utf-8-sig")))
     return Checked(f"{where}: {_summary(exercise)}", tuple(f"{where}:{m.line}:{m.column}: {m.text}" for m in odd))
 
@@ -194,7 +194,9 @@ def _read_recordings(path: Path, exercise: Exercise) -> None:
                 try:
                     recordings_of([stimulus], tuple(map(Path, exercise.interfaces)))
                 except RecordingError as error:
-                    raise RubricMistakes(shown(str(path), 500), [where.mistake(error.message, error.hint)]) from None
+                    raise RubricMistakes(
+                        printable(str(path), 500), [where.mistake(error.message, error.hint)]
+                    ) from None
 
 
 def complaints(error: RubricError) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from grader.course.authoring.skeleton import DraftCriterion, DraftQuantity, as_id, in_seconds
 from grader.grading.judging.summary import summarise
-from grader.grading.judging.values import carries_number, leaves, student_endpoints
+from grader.grading.judging.values import carries_number, numbers_by_path, student_endpoints
 from grader.grading.model.report import TopicSummary
 from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
@@ -20,7 +20,7 @@ _EVERYBODYS = ("use_sim_time", "start_type_description_service")
 _OVERRIDES = "qos_overrides."
 
 
-def parameters(trace: Trace) -> Iterator[tuple[str, str, str | float | bool | None]]:
+def student_parameters(trace: Trace) -> Iterator[tuple[str, str, str | float | bool | None]]:
     """Yield node, name and value of each parameter, with an empty node if only one has any; lists become None."""
     offers = [(o.name.partition(":"), o.detail) for o in trace.of(Offer) if o.kind == "parameter"]
     own = {
@@ -106,7 +106,10 @@ def _answers(trace: Trace, inputs: tuple[Delivery, ...], answered: str) -> list[
 def _scalars(value: Mapping[str, object]) -> dict[str, float | str]:
     """Return every number and text of a message by path, with the first elements of lists."""
     value = _with_elements(value)
-    return {**dict(texts(value)), **{k: v for k, v in leaves(value).items() if not k.endswith(OF_THE_RUN) and v == v}}  # noqa: PLR0124  NaN
+    return {
+        **dict(texts(value)),
+        **{k: v for k, v in numbers_by_path(value).items() if not k.endswith(OF_THE_RUN) and v == v},  # noqa: PLR0124  NaN
+    }
 
 
 def _telling(answers: list[Message]) -> list[str]:
@@ -210,7 +213,7 @@ def _reaction(topic: TopicSummary, seen: Seen, needs: str) -> DraftCriterion:
 
 
 def _fields(topic: TopicSummary, seen: Seen, needs: str) -> Iterator[DraftCriterion]:
-    rows = [leaves(message.value) for message in seen.driven.messages(topic.name)]
+    rows = [numbers_by_path(message.value) for message in seen.driven.messages(topic.name)]
     constant, varying = _sorted_out(rows)
     name = as_id(topic.name)
     if constant:
@@ -298,7 +301,7 @@ def _services(seen: Seen) -> Iterator[DraftCriterion]:
 
 
 def _parameters(seen: Seen) -> Iterator[DraftCriterion]:
-    for node, name, value in parameters(seen.alone):
+    for node, name, value in student_parameters(seen.alone):
         asked: dict[str, object] = {"name": name, **({"node": node} if node else {})}
         comment = "decide: does the task ask for this default?"
         if value is None:

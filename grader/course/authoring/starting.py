@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
-from grader.course.authoring.questions import Seen, parameters, questions
+from grader.course.authoring.questions import Seen, questions, student_parameters
 from grader.course.authoring.skeleton import (
     Draft,
     DraftCriterion,
@@ -20,7 +20,7 @@ from grader.course.authoring.skeleton import (
     rubric_text,
 )
 from grader.grading.app.grade import Progress
-from grader.grading.app.inputs import FIRST_S, NOTHING, SentMessages, copied, period_s
+from grader.grading.app.inputs import FIRST_S, NOTHING, SentMessages, copied_simulation, period_s
 from grader.grading.app.interfaces import known_interfaces
 from grader.grading.app.observe import ObserveRequest, undisturbed, watch
 from grader.grading.judging.findings import fault_sentence
@@ -103,7 +103,7 @@ def _services(trace: Trace, simulated: frozenset[str]) -> Iterator[DraftStimulus
 
 
 def _parameters(trace: Trace) -> Iterator[DraftStimulus]:
-    for node, name, _ in parameters(trace):
+    for node, name, _ in student_parameters(trace):
         asked = {"name": name, **({"node": node} if node else {}), "start": in_seconds(1)}
         yield DraftStimulus("parameter", asked, f"asks for the value of {name}; decide: should it be set too?")
 
@@ -208,7 +208,7 @@ def _scenario_of(draft: Draft, files: Mapping[str, Path]) -> Scenario:
 def _read(text: str, files: Mapping[str, Path] = NO_FILES) -> Exercise:
     with tempfile.TemporaryDirectory(prefix="grade-new-") as folder:
         for name, file in files.items():
-            copied(file, Path(folder) / name)
+            copied_simulation(file, Path(folder) / name)
         path = Path(folder) / "rubric.yaml"
         path.write_text(text, encoding="utf-8")
         return read_rubric(path, interfaces=known_interfaces())

@@ -17,12 +17,12 @@ from grader.grading.rubrics.mistakes import (
     YamlSyntaxError,
     YamlTree,
     mistakes_of,
-    nearest,
+    nearest_hint,
     read_yaml,
 )
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 #: A file of some thousand students with reasons has less.
 MAX_BYTES = 1 << 20
@@ -238,7 +238,7 @@ def _misread_numbers(tree: YamlTree) -> Iterator[Mistake]:
 
 
 def _found(text: str) -> str:
-    return f"`{shown(text, 60)}`" if text.strip() else "nothing"
+    return f"`{printable(text, 60)}`" if text.strip() else "nothing"
 
 
 def _number_hint(path: TreePath, text: str) -> str:
@@ -309,7 +309,7 @@ def _contradictions(read: _File, tree: YamlTree) -> Iterator[Mistake]:
             text = "expected `score` or `bonus`, found both"
             yield tree.keys["students", name, "bonus"].mistake(text, "write the sum as `score`")
         elif student.score is not None and scored:
-            text = f"expected a `score` for the whole or for criteria, found both (`{shown(scored[0], 60)}`)"
+            text = f"expected a `score` for the whole or for criteria, found both (`{printable(scored[0], 60)}`)"
             yield tree.keys["students", name, "score"].mistake(text, "leave one out: the first replaces the others")
 
 
@@ -368,7 +368,7 @@ def with_criteria(
     for name, decision in adjustments.students.items():
         _refuse_excess(decision, most, bonus)
         for new in decision.rename.values():
-            hint = "" if new in files else nearest(new, files)
+            hint = "" if new in files else nearest_hint(new, files)
             if hint:
                 raise ClassError(
                     f"{decision.where}: expected the name of a file that is asked for, found `{new}`", hint
@@ -405,23 +405,24 @@ def _full_id(id_: str, found: CriterionDecision, points: Mapping[str, Fraction])
         raise ClassError(f"{found.where}: expected one criterion, found {len(meant)}: {listed(meant, 'and')}")
     known = [*points, *(full.split("/")[1] for full in points)]
     raise ClassError(
-        f"{found.where}: expected a criterion of the rubrics, found `{shown(id_, 60)}`", nearest(id_, known)
+        f"{found.where}: expected a criterion of the rubrics, found `{printable(id_, 60)}`", nearest_hint(id_, known)
     )
 
 
 def several_students(decision: Decision, name: str, found: Sequence[str]) -> ClassError:
     """Build the error for a decision that several students may be meant by."""
-    text = f"{decision.where}: expected one student, found {len(found)} for `{shown(name, 60)}`"
-    return ClassError(text, f"name one of the submissions: {listed([f'`{shown(one, 80)}`' for one in found])}")
+    text = f"{decision.where}: expected one student, found {len(found)} for `{printable(name, 60)}`"
+    return ClassError(text, f"name one of the submissions: {listed([f'`{printable(one, 80)}`' for one in found])}")
 
 
 def decided_twice(decision: Decision, name: str, submission: str, other: str) -> ClassError:
     """Build the error for two decisions about one submission."""
-    text = f"{decision.where}: expected one decision about {shown(submission, 80)}, found `{shown(name, 60)}` as well"
-    return ClassError(text, f"put both under `{shown(other, 60)}`")
+    text = f"{decision.where}: expected one decision about {printable(submission, 80)}, "
+    text += f"found `{printable(name, 60)}` as well"
+    return ClassError(text, f"put both under `{printable(other, 60)}`")
 
 
 def unknown_student(decision: Decision, name: str, known: list[str]) -> ClassError:
     """Build the error for a decision about somebody who is not in the class."""
     message = f"{decision.where}: expected a submission or a person of the class, found `{name[:60]}`"
-    return ClassError(message, nearest(name, known))
+    return ClassError(message, nearest_hint(name, known))

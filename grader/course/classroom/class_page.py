@@ -18,7 +18,15 @@ from grader.course.class_page.contents import (
     StudentRow,
 )
 from grader.course.class_page.render import REPORT_PAGE, result_link
-from grader.course.classroom.gradebook import Gradebook, Row, Status, decision_line, exactly, exercises_of, remarks
+from grader.course.classroom.gradebook import (
+    Gradebook,
+    Row,
+    Status,
+    decision_line,
+    exactly,
+    report_exercises,
+    row_remarks,
+)
 from grader.course.classroom.roster import Person
 from grader.course.classroom.store import Conditions
 from grader.course.classroom.watching import clock_time
@@ -47,7 +55,7 @@ def title_of(sources: Sequence[Path]) -> str:
     return ", ".join(source.resolve().name for source in sources)
 
 
-def folders_of(paths: Sequence[Path]) -> tuple[str, ...]:
+def folder_spellings(paths: Sequence[Path]) -> tuple[str, ...]:
     """Return the spellings of folders that messages may contain, the longest first."""
     found = {str(path) for path in paths} | {str(path.resolve()) for path in paths}
     return tuple(sorted((folder for folder in found if folder.startswith("/")), key=lambda f: (-len(f), f)))
@@ -139,13 +147,13 @@ _ENDED = {"exited": "ended by itself", "killed": "was killed", "hung": "did not 
 
 def class_page(book: Gradebook, run: RunOfClass, links: Sequence[PageLink] = ()) -> ClassPage:
     """Build the page of a class, with links to other pages in the results folder."""
-    rows = in_order(book.rows)
+    rows = rows_in_order(book.rows)
     students = tuple(_student(row, run) for row in rows)
     listings = [listing for listing in _listings(book, rows, run) if listing.entries]
     return ClassPage(run.title, run_facts(book, run), students, tuple(listings), tuple(links))
 
 
-def in_order(rows: Iterable[Row]) -> list[Row]:
+def rows_in_order(rows: Iterable[Row]) -> list[Row]:
     """Return the rows in the order of the class page: by surname, then by the rest of the name."""
     return sorted(rows, key=lambda row: (*_sort_key(row), row.name))
 
@@ -157,7 +165,7 @@ def _sort_key(row: Row) -> tuple[str, str]:
 
 def links_between(book: Gradebook) -> dict[str, ClassLinks]:
     """Return name of an entry -> the links of its page to the class page and to its neighbours on that page."""
-    rows = [row for row in in_order(book.rows) if row.report is not None]
+    rows = [row for row in rows_in_order(book.rows) if row.report is not None]
     pages = [(f"../{result_link(row.name, REPORT_PAGE).removeprefix('students/')}", _name(row)) for row in rows]
     neighbours = [None, *pages, None]
     return {
@@ -178,7 +186,7 @@ def _student(row: Row, run: RunOfClass) -> StudentRow:
         max_score=row.max_score,
         final=adjusted.score,
         adjustments=tuple(line for line in [decision_line(row)] if line),
-        remarks=tuple(without_folders(text, run.folders) for text in remarks(row)),
+        remarks=tuple(without_folders(text, run.folders) for text in row_remarks(row)),
         report=row.report,
         counts=not adjusted.ignored,
     )
@@ -284,7 +292,7 @@ def _texts(texts: Sequence[str], run: RunOfClass) -> tuple[PageEntry, ...]:
 
 
 def _undecided(index: int, row: Row, run: RunOfClass) -> Iterator[PageEntry]:
-    for exercise in exercises_of(row.report):
+    for exercise in report_exercises(row.report):
         if why := exercise.get("unchecked"):
             yield PageEntry(f"{exercise['title']}: {without_folders(why, run.folders)}", index)
         for criterion in exercise["criteria"]:
@@ -300,7 +308,7 @@ def _problem(row: Row, run: RunOfClass) -> str:
 
 
 def _faults(index: int, row: Row) -> Iterator[PageEntry]:
-    for exercise in exercises_of(row.report):
+    for exercise in report_exercises(row.report):
         for fault in exercise.get("faults", ()):
             where = f"{fault['file']}:{fault['line']}" if fault["line"] else fault["file"] or "a node"
             what = _ENDED.get(fault["kind"], str(fault["kind"]).replace("_", " "))

@@ -19,14 +19,14 @@ import grader
 from grader.course.class_page.class_links import with_class_links
 from grader.course.class_page.contents import PageLink
 from grader.course.classroom.adjustments import Adjustments, read_adjustments, with_criteria
-from grader.course.classroom.class_page import RunOfClass, folders_of, links_between, title_of, without_folders
+from grader.course.classroom.class_page import RunOfClass, folder_spellings, links_between, title_of, without_folders
 from grader.course.classroom.final_marks import MARK, dump_mark, kept_mark, shown_mark
-from grader.course.classroom.gradebook import Gradebook, Row, Status, decisions_for, make_gradebook, number
+from grader.course.classroom.gradebook import Gradebook, Row, Status, decisions_for, make_gradebook, points_text
 from grader.course.classroom.grading import (
     ClassRequest,
     ClassRun,
-    digest_of,
     due_now,
+    handed_in_digest,
     own_conditions,
     refuse_without_key,
     with_known_students,
@@ -49,7 +49,7 @@ from grader.course.classroom.roster import RosterMatch, Table, match, read_roste
 from grader.course.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
 from grader.course.classroom.watching import Watcher
 from grader.course.classroom.worker import GRADESCOPE, HANDED_BACK, HANDED_BACK_PAGE, PAGE
-from grader.course.similarity.finding import find_similar, read_programs
+from grader.course.similarity.finding import find_similar, read_compared
 from grader.course.similarity.library import ComparedProgram, Handed, Similar
 from grader.course.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
 from grader.grading.app.bags import read_given, read_recordings, recordings_digest
@@ -66,7 +66,7 @@ from grader.grading.reporting.rejudged import ReportChange, change, render_chang
 from grader.grading.rubrics.draws import First
 from grader.runtime.interface_packages import offered_digest
 from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.temp_dirs import scratch_folder
 
 __all__ = [
@@ -144,17 +144,13 @@ def _adjustments(course: ClassRequest, exercises: Sequence[Exercise], warn: Call
 
     Raises ClassError if the last run applied decisions and this one was given none: marks would change in silence.
     """
-    if course.no_adjustments:
-        return Adjustments()
     kept = course.results / ADJUSTMENTS
     there = kept if kept.is_file() else None
     path = course.adjustments or there
     if path is None:
-        last = read_last_run(course.results)
-        if last.decisions:
-            count = f"{last.decisions} decision{'' if last.decisions == 1 else 's'}"
-            text = f"--adjust: expected the {count} of {last.adjustments}, which the last run applied, found none"
-            raise ClassError(text, "give the file again with --adjust, or leave it out with --no-adjust")
+        for applied in read_last_run(course.results).options.get("adjust", ()):
+            text = f"{course.results / RUN}: --adjust: expected {applied}, which the last run used, found nothing there"
+            raise ClassError(text, "give it again with --adjust, or delete the line to leave it out")
         return Adjustments()
     if there is not None and path.resolve() != there.resolve():
         warn(f"{there} is not applied, because --adjust names {path}")
@@ -165,8 +161,8 @@ def _adjustments(course: ClassRequest, exercises: Sequence[Exercise], warn: Call
 
 def _kept_options(course: ClassRequest, adjustments: Adjustments) -> LastRun:
     """Return what the next run needs to know of this one."""
-    path = "" if adjustments.path is None else str(adjustments.path.resolve())
-    return LastRun(course.options, path, adjustments.count, _places(course.sources))
+    applied = {} if adjustments.path is None else {"adjust": (str(adjustments.path.absolute()),)}
+    return LastRun({**course.options, **applied}, _places(course.sources))
 
 
 def _places(sources: Sequence[Path]) -> tuple[str, ...]:
@@ -178,7 +174,7 @@ def _warn_of_another_class(course: ClassRequest, store: Store, intake: Intake, w
     last, results = read_last_run(course.results).sources, set(store.names())
     if last and results and not results & {entry.name for entry in intake.entries}:
         count = f"{len(results)} result{'' if len(results) == 1 else 's'}"
-        where = ", ".join(shown(place, 200) for place in last)
+        where = ", ".join(printable(place, 200) for place in last)
         kept = f"{course.results} holds {count} of another class, of {where}"
         warn(f"{kept}: they stay, but gradebook and page show this class; name another folder with -o to keep both")
 
@@ -196,7 +192,7 @@ def conditions_of(grading: GradeRequest, exercises: Sequence[Exercise]) -> Condi
 
 def _digest(entry: HandedInEntry, scratch: Path, wanted: Sequence[str]) -> tuple[str, SubmissionError | None]:
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
-        return digest_of(entry, Path(folder), wanted)
+        return handed_in_digest(entry, Path(folder), wanted)
 
 
 def _seeded(own: Mapping[str, Conditions], digests: Mapping[str, str], course: ClassRequest) -> dict[str, Conditions]:
@@ -250,7 +246,7 @@ def _run(course: ClassRequest, conditions: Conditions, began_s: float, graded: G
         graded=0 if graded is None else graded.graded,
         kept=0 if graded is None else graded.kept_before,
         stopped=graded is None,
-        folders=folders_of([*course.sources, course.results, Path.cwd(), Path(tempfile.gettempdir())]),
+        folders=folder_spellings([*course.sources, course.results, Path.cwd(), Path(tempfile.gettempdir())]),
     )
 
 
@@ -286,7 +282,7 @@ def _moved(book: Gradebook, store: Store) -> tuple[str, ...]:
         person = None if row.person is None else json_value(row.person.name)
         old, new = before.get((row.name or None, person)), row.adjusted.score
         if old is not None and (new is None or json_value(new) != old):
-            found.append(f"{row.distinct_name} {number(old)} -> {number(new) or 'no score'}")
+            found.append(f"{row.distinct_name} {points_text(old)} -> {points_text(new) or 'no score'}")
     return tuple(found)
 
 
@@ -393,7 +389,7 @@ def _link(note: str) -> PageLink:
 
 
 def _handed(entry: HandedInEntry, row: Row | None) -> Handed:
-    programs, passed_over = ((), ()) if entry.problem else read_programs(entry.path)
+    programs, passed_over = ((), ()) if entry.problem else read_compared(entry.path)
     return Handed(
         name=entry.name,
         label=entry.label if row is None else row.shown_name,

@@ -31,7 +31,7 @@ from grader.runtime.files import write_whole
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError
 from grader.runtime.model.limits import MAX_ARCHIVE_BYTES
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 #: Groups that a pattern may have; with `file`, several files of one student form one submission.
 GROUPS = ("name", "user", "email", "id", "late", "file")
@@ -105,17 +105,17 @@ class DownloadLayout:
         plain = [file if file in wanted else _HANDED_IN_AGAIN.sub("", file) for file in files]
         taken = Counter([*files, *(short for short, file in zip(plain, files, strict=True) if short != file)])
         return [
-            (file,) if taken[short] > 1 or short == file else (short,) if is_program(short) else (file, short)
+            (file,) if taken[short] > 1 or short == file else (short,) if is_gradable(short) else (file, short)
             for short, file in zip(plain, files, strict=True)
         ]
 
 
-def is_program(name: str) -> bool:
+def is_gradable(name: str) -> bool:
     """Whether a file may hold what is graded: a program, or an archive of some."""
     return name.casefold().endswith((".py", *ARCHIVE_SUFFIXES))
 
 
-def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
+def download_layout(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
     """Determine the layout of a download from the names in its top folder, `place`.
 
     A regular expression of the user overrides the layout that is wanted; raises ClassError if it cannot be used.
@@ -129,7 +129,7 @@ def layout_of(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> D
     if wanted == FOLDERS:
         return DownloadLayout(FOLDERS)
     for name in (MOODLE, CANVAS):
-        layout = layout_of(name, "", place, labels)
+        layout = download_layout(name, "", place, labels)
         if labels and sum(layout.read(label).recognised for label in labels) * 2 > len(labels):
             return layout
     slug = _slug(place, labels)
@@ -141,7 +141,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
         compiled = re.compile(pattern, re.DOTALL)
     except re.error as error:
         where = f"--pattern, column {(error.pos or 0) + 1}"
-        raise ClassError(f"{where}: expected a regular expression, found {shown(pattern)}: {error.msg}") from None
+        raise ClassError(f"{where}: expected a regular expression, found {printable(pattern)}: {error.msg}") from None
     odd = [group for group in compiled.groupindex if group not in GROUPS]
     if odd or not compiled.groupindex:
         found = f"the group {odd[0]}" if odd else "no named group"
@@ -267,12 +267,12 @@ def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
         if name in ("", ".") or f"{whole}/" == around:
             continue
         if name_problem(part) or not whole.startswith(around):
-            found.strays.append(f"{shown(whole)} ({name_problem(part) or 'beside the folder of all others'})")
+            found.strays.append(f"{printable(whole)} ({name_problem(part) or 'beside the folder of all others'})")
         elif name_problem(name) or not is_skipped(name if member.kind != FOLDER else f"{name}/x"):
             by_part.setdefault(part, []).append((name, member))
         elif why_skipped(part, is_folder=bool(below) or member.kind == FOLDER):
             overlooked[part] = why_skipped(part, is_folder=bool(below) or member.kind == FOLDER)
-    found.strays += [f"{shown(part)}: {why}, so it is not graded" for part, why in overlooked.items()]
+    found.strays += [f"{printable(part)}: {why}, so it is not graded" for part, why in overlooked.items()]
     left = MAX_UNPACKED_BYTES
     for part, inside in by_part.items():
         problem, size = _write_part(inside, top, left)
@@ -326,7 +326,7 @@ def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tupl
         total += len(content)
         if total > min(MAX_PART_BYTES, left):
             limit = min(MAX_PART_BYTES, left) >> 20
-            return f"expected at most {limit} MiB in all, found more with {shown(name)}", total
+            return f"expected at most {limit} MiB in all, found more with {printable(name)}", total
         (into / name).parent.mkdir(parents=True, exist_ok=True)
         (into / name).write_bytes(content)
     return "", total
@@ -343,10 +343,10 @@ def _name_problem(inside: list[tuple[str, Member]]) -> str:
     for name, member in inside:
         problem = name_problem(name)
         if problem:
-            return f"expected plain relative names, found {problem}: {shown(name)}"
+            return f"expected plain relative names, found {problem}: {printable(name)}"
         if member.kind not in (FILE, FOLDER):
-            return f"expected plain files, found {member.kind}: {shown(name)}"
+            return f"expected plain files, found {member.kind}: {printable(name)}"
     names = [name for name, member in inside if member.kind == FILE]
     twice = [name for name, count in Counter(names).items() if count > 1]
     twins = (twice[0], twice[0]) if twice else collision(names)
-    return f"expected different names, found {shown(twins[0])} and {shown(twins[1])}" if twins else ""
+    return f"expected different names, found {printable(twins[0])} and {printable(twins[1])}" if twins else ""

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from grader.course.classroom.adjustments import Adjusted, CriterionDecision
-from grader.course.classroom.gradebook import Row, days, exactly, exercises_of, number
+from grader.course.classroom.gradebook import Row, days, exactly, points_text, report_exercises
 from grader.grading.model.exercise import Outcome
 from grader.grading.reporting.escape import json_value
 from grader.grading.reporting.html.final_mark import CriterionMark, FinalMark, ScoreShown
@@ -59,7 +59,7 @@ def _fraction(type_: type, value: Any) -> Any:
     return type_(value)
 
 
-def fits(mark: KeptMark, report: ReportData) -> bool:
+def mark_fits(mark: KeptMark, report: ReportData) -> bool:
     """Return whether a mark was made from the points of a report, of which criteria may be left out."""
     return all(mark.points.get(id_) == exactly(criterion["score"]) for id_, criterion in criteria_of(report))
 
@@ -67,7 +67,7 @@ def fits(mark: KeptMark, report: ReportData) -> bool:
 def shown_mark(mark: KeptMark, report: ReportData | None) -> FinalMark:
     """Return what a page shows of a mark: for a report without some criteria, nothing that would reveal them."""
     if report is None:
-        phrase = "" if mark.adjusted.score is None else f"final mark {number(mark.adjusted.score)} points"
+        phrase = "" if mark.adjusted.score is None else f"final mark {points_text(mark.adjusted.score)} points"
         return FinalMark(mark.student, phrase, tuple(_on_the_whole(mark.adjusted, totals=True)))
     criteria = dict(criteria_of(report))
     everything = set(criteria) == set(mark.points)
@@ -107,7 +107,7 @@ def _criterion(found: CriterionData, decided: CriterionDecision | None) -> Crite
         return CriterionMark(raw, of)
     if decided.score is None:
         return CriterionMark(raw, of, comment=decided.comment)
-    said = f"{number(decided.score)} of {number(of)} points instead of {number(raw)}: {decided.reason}"
+    said = f"{points_text(decided.score)} of {points_text(of)} points instead of {points_text(raw)}: {decided.reason}"
     return CriterionMark(decided.score, of, said, decided.comment)
 
 
@@ -123,7 +123,7 @@ def _on_criteria(row: Row) -> Iterator[str]:
         if decided is None:
             continue
         mark = _criterion(criterion, decided)
-        points = mark.decision or f"{number(mark.score)} of {number(mark.max_score)} points"
+        points = mark.decision or f"{points_text(mark.score)} of {points_text(mark.max_score)} points"
         yield f"{criterion['title']}: {points}." + (f" Comment: {mark.comment}." if mark.comment else "")
 
 
@@ -144,18 +144,19 @@ def _on_the_whole(adjusted: Adjusted, *, totals: bool) -> Iterator[str]:
 
 def _on_the_score(adjusted: Adjusted) -> Iterator[str]:
     if adjusted.override is not None:
-        raw = f" instead of {number(adjusted.marked)}" if adjusted.marked is not None else ""
-        yield f"The score was set to {number(adjusted.override)}{raw}: {adjusted.reason}."
+        raw = f" instead of {points_text(adjusted.marked)}" if adjusted.marked is not None else ""
+        yield f"The score was set to {points_text(adjusted.override)}{raw}: {adjusted.reason}."
     elif adjusted.penalty:
-        yield f"{number(adjusted.marked)} points, less {number(adjusted.penalty)} for {days(adjusted.days_late)} late."
+        less = f"less {points_text(adjusted.penalty)} for {days(adjusted.days_late)} late"
+        yield f"{points_text(adjusted.marked)} points, {less}."
     if adjusted.bonus or adjusted.bonus_lost:
-        given = f"A bonus of {number(adjusted.bonus + adjusted.bonus_lost)} points"
-        counted = f", of which {number(adjusted.bonus)} count up to the maximum" if adjusted.bonus_lost else ""
+        given = f"A bonus of {points_text(adjusted.bonus + adjusted.bonus_lost)} points"
+        counted = f", of which {points_text(adjusted.bonus)} count up to the maximum" if adjusted.bonus_lost else ""
         yield f"{given}{counted}: {adjusted.reason}."
 
 
 def criteria_of(report: ReportData | None) -> Iterator[tuple[str, CriterionData]]:
     """Yield `exercise/criterion` and the criterion, in the order of the report."""
-    for exercise in exercises_of(report):
+    for exercise in report_exercises(report):
         for criterion in exercise["criteria"]:
             yield f"{exercise['id']}/{criterion['id']}", criterion

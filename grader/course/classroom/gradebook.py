@@ -116,7 +116,7 @@ class Gradebook:
         """Mistakes of the rubrics' authors that leave criteria undecided, each with the rows that it concerns."""
         found: dict[str, list[Row]] = {}
         for row in self.rows:
-            criteria = [criterion for exercise in exercises_of(row.report) for criterion in exercise["criteria"]]
+            criteria = [criterion for exercise in report_exercises(row.report) for criterion in exercise["criteria"]]
             for mistake in dict.fromkeys(filter(None, map(author_mistake, criteria))):
                 found.setdefault(mistake, []).append(row)
         return {mistake: tuple(rows) for mistake, rows in found.items()}
@@ -209,14 +209,14 @@ def _excess(rows: Sequence[Row], extra: Fraction) -> Iterator[str]:
     for row in rows:
         score = row.adjusted.override
         if score is not None and row.max_score is not None and score > row.max_score + extra:
-            most = number(row.max_score + extra)
-            yield f"the score set for {row.distinct_name}, {number(score)}, is above the maximum of {most} points"
+            most = points_text(row.max_score + extra)
+            yield f"the score set for {row.distinct_name}, {points_text(score)}, is above the maximum of {most} points"
 
 
 def _decided(report: ReportData | None, decision: Decision) -> tuple[Fraction | None, Mapping[str, CriterionDecision]]:
     """Return the points after decisions about criteria, None while some are undecided, and the decisions that apply."""
     points, final, found = Fraction(0), report is not None, {}
-    for exercise in exercises_of(report):
+    for exercise in report_exercises(report):
         for criterion in exercise["criteria"]:
             id_ = f"{exercise['id']}/{criterion['id']}"
             decided = decision.criteria.get(id_)
@@ -360,7 +360,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return text.getvalue()
 
 
-def number(value: Fraction | float | None) -> str:
+def points_text(value: Fraction | float | None) -> str:
     """Format points; None becomes an empty text."""
     if value is None:
         return ""
@@ -373,7 +373,7 @@ def text_cell(text: str) -> str:
     return csv_cell(text, limit=_TEXT_LIMIT)
 
 
-def remarks(row: Row) -> list[str]:
+def row_remarks(row: Row) -> list[str]:
     """Return the remarks about a row."""
     found = [shown(row.problem, limit=500)] if row.problem else []
     found += [f"hint: {shown(row.hint, limit=500)}"] if row.hint else []
@@ -392,7 +392,7 @@ def remarks(row: Row) -> list[str]:
         found.append("does not count")
     if row.status.value == "undecided":
         found += [f"not final: {shown(why, limit=500)}" for why in unchecked(row.report)]
-        criteria = [c for e in exercises_of(row.report) for c in e["criteria"]]
+        criteria = [c for e in report_exercises(row.report) for c in e["criteria"]]
         theirs = any(map(may_be_theirs, criteria))
         why = "perhaps because of what the submission does" if theirs else "through no fault of the student"
         if any(criterion["outcome"] == Outcome.UNDECIDED.value for criterion in criteria):
@@ -407,13 +407,13 @@ def decision_line(row: Row) -> str:
         return ""
     before = None if row.report is None else exactly(row.report["score"])
     after = row.adjusted.score
-    return f"{number(before) or 'no score'} -> {number(after) or 'no score'} ({'; '.join(causes)})"
+    return f"{points_text(before) or 'no score'} -> {points_text(after) or 'no score'} ({'; '.join(causes)})"
 
 
 def decision_causes(row: Row) -> list[str]:
     """Return each decision about a row with its reason, in the order in which they count."""
     adjusted = row.adjusted
-    ids = [f"{e['id']}/{c['id']}" for e in exercises_of(row.report) for c in e["criteria"]]
+    ids = [f"{e['id']}/{c['id']}" for e in report_exercises(row.report) for c in e["criteria"]]
     found = [f"{old} renamed to {new}" for old, new in adjusted.rename.items()]
     if adjusted.ignored:
         return [*found, f"ignored, {adjusted.reason}"]
@@ -425,12 +425,16 @@ def decision_causes(row: Row) -> list[str]:
         found.append(f"score set, {adjusted.reason}")
     elif adjusted.days_late:
         points = (
-            "1 point" if adjusted.penalty == 1 else f"{number(adjusted.penalty) if adjusted.penalty else 'no'} points"
+            "1 point"
+            if adjusted.penalty == 1
+            else f"{points_text(adjusted.penalty) if adjusted.penalty else 'no'} points"
         )
         found.append(f"{days(adjusted.days_late)} late, {points} off")
     if adjusted.bonus or adjusted.bonus_lost:
-        counts = f", of which {number(adjusted.bonus)} count: the maximum is reached" if adjusted.bonus_lost else ""
-        found.append(f"bonus {number(adjusted.bonus + adjusted.bonus_lost)}{counts}, {adjusted.reason}")
+        counts = (
+            f", of which {points_text(adjusted.bonus)} count: the maximum is reached" if adjusted.bonus_lost else ""
+        )
+        found.append(f"bonus {points_text(adjusted.bonus + adjusted.bonus_lost)}{counts}, {adjusted.reason}")
     if not found and (adjusted.comment or any(decided.comment for decided in adjusted.criteria.values())):
         found.append("comment")
     return found
@@ -438,7 +442,7 @@ def decision_causes(row: Row) -> list[str]:
 
 def days(count: Fraction) -> str:
     """Return a number of days as text."""
-    return f"{number(count)} {'day' if count == 1 else 'days'}"
+    return f"{points_text(count)} {'day' if count == 1 else 'days'}"
 
 
 def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
@@ -448,16 +452,16 @@ def _cells(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str
     return [
         *map(text_cell, texts),
         row.standing,
-        number(adjusted.score),
-        number(row.max_score),
-        number(raw),
-        number(adjusted.days_late) if adjusted.days_late else "",
-        number(adjusted.penalty) if adjusted.penalty else "",
-        number(adjusted.override),
+        points_text(adjusted.score),
+        points_text(row.max_score),
+        points_text(raw),
+        points_text(adjusted.days_late) if adjusted.days_late else "",
+        points_text(adjusted.penalty) if adjusted.penalty else "",
+        points_text(adjusted.override),
         text_cell(adjusted.reason),
-        text_cell("; ".join(remarks(row))),
+        text_cell("; ".join(row_remarks(row))),
         text_cell(f"students/{row.name}/report.html") if row.report is not None else "",
-        number(adjusted.bonus) if adjusted.bonus else "",
+        points_text(adjusted.bonus) if adjusted.bonus else "",
         text_cell(decision_line(row)),
         *_points(row, exercises, criteria),
     ]
@@ -468,7 +472,7 @@ def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[
     exercises: dict[str, None] = {}
     criteria: dict[tuple[str, str], None] = {}
     for row in rows:
-        for exercise in exercises_of(row.report):
+        for exercise in report_exercises(row.report):
             exercises[exercise["id"]] = None
             criteria.update({(exercise["id"], criterion["id"]): None for criterion in exercise["criteria"]})
     return list(exercises), sorted(criteria, key=lambda pair: list(exercises).index(pair[0]))
@@ -476,24 +480,27 @@ def _exercises_and_criteria(rows: Iterable[Row]) -> tuple[list[str], list[tuple[
 
 def _points(row: Row, exercises: Sequence[str], criteria: Sequence[tuple[str, str]]) -> list[str]:
     """Return the grader's points by exercise, and those that count by criterion."""
-    by_exercise = {e["id"]: e for e in exercises_of(row.report)}
+    by_exercise = {e["id"]: e for e in report_exercises(row.report)}
     set_ = {id_: decided.score for id_, decided in row.adjusted.criteria.items() if decided.score is not None}
     found = {(id_, c["id"]): c for id_, e in by_exercise.items() for c in e["criteria"]}
     decided = {pair: criterion for pair, criterion in found.items() if criterion["outcome"] != "undecided"}
     return [
-        *(number(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
-        *(number(set_.get("/".join(pair), decided[pair]["score"] if pair in decided else None)) for pair in criteria),
+        *(points_text(by_exercise[id_]["score"]) if id_ in by_exercise else "" for id_ in exercises),
+        *(
+            points_text(set_.get("/".join(pair), decided[pair]["score"] if pair in decided else None))
+            for pair in criteria
+        ),
     ]
 
 
-def exercises_of(report: ReportData | None) -> Sequence[ExerciseData]:
+def report_exercises(report: ReportData | None) -> Sequence[ExerciseData]:
     """Return the exercises of a report, none without one."""
     return () if report is None else report["exercises"]
 
 
 def unchecked(report: ReportData | None) -> list[str]:
     """Return why checks on the wall clock ended without a result, each reason once."""
-    return list(dict.fromkeys(filter(None, (exercise.get("unchecked", "") for exercise in exercises_of(report)))))
+    return list(dict.fromkeys(filter(None, (exercise.get("unchecked", "") for exercise in report_exercises(report)))))
 
 
 def may_be_theirs(criterion: CriterionData) -> bool:

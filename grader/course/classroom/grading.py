@@ -21,7 +21,7 @@ from grader.course.classroom.watching import Watcher
 from grader.course.similarity.library import ComparedProgram
 from grader.grading.app.grade import begun, read_exercises, wanted_files
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.seeds import ByKey, SeedKey, checked, drawn, read_key
+from grader.grading.app.seeds import ByKey, SeedKey, checked_student, drawn_values, read_key
 from grader.grading.model.exercise import Exercise
 from grader.grading.reporting.html.assets import bundle
 from grader.grading.rubrics.draws import Recorded
@@ -55,7 +55,6 @@ class ClassRequest:
     pattern: str = ""  # a regular expression for names, used instead of the layout; empty for none
     roster: Path | None = None  # CSV file of the class; None if there is none
     adjustments: Path | None = None  # YAML file of late days and changed scores; None if there is none
-    no_adjustments: bool = False  # whether no decisions are applied, not even those kept in the results folder
     grading: GradeRequest = _GRADING  # the request as for one submission; its path is ignored
     jobs: int | None = None  # submissions graded in parallel; None for one per processor
     rerun: str = CHANGED  # `--rerun`, one of the values above
@@ -70,7 +69,7 @@ class ClassRequest:
     options: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def digest_of(entry: HandedInEntry, scratch: Path, wanted: Sequence[str]) -> tuple[str, SubmissionError | None]:
+def handed_in_digest(entry: HandedInEntry, scratch: Path, wanted: Sequence[str]) -> tuple[str, SubmissionError | None]:
     """Return the digest of a submission, copied to an empty folder, and why it cannot be used, if so.
 
     Wanted are the names of the files that exercises ask for, for the hint. The digest is empty if it cannot be
@@ -281,7 +280,7 @@ def with_known_students(
 
 def _known(entry: HandedInEntry, person: Person | None) -> HandedInEntry:
     try:
-        checked(student_of(person))
+        checked_student(student_of(person))
     except VariantError:
         return replace(entry, problem=_NOBODY if person is None else _NO_ID)
     return entry
@@ -319,8 +318,8 @@ def own_conditions(
     for entry in entries:
         found[entry.name] = conditions
         if not entry.problem:
-            draw = ByKey(key, checked(student_of(people.get(entry.name))))
+            draw = ByKey(key, checked_student(student_of(people.get(entry.name))))
             own = read_exercises(replace(course.grading, draw=draw), course.sources)
             digests = tuple((exercise.id, exercise.digest) for exercise in own)
-            found[entry.name] = replace(conditions, rubrics=digests, variants=drawn(own, draw.student))
+            found[entry.name] = replace(conditions, rubrics=digests, variants=drawn_values(own, draw.student))
     return found

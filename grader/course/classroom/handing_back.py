@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from grader.course.classroom.final_marks import MARK, KeptMark, fits, load_mark, shown_mark
+from grader.course.classroom.final_marks import MARK, KeptMark, load_mark, mark_fits, shown_mark
 from grader.course.classroom.store import RESULT
 from grader.grading.reporting.escape import shown
 from grader.grading.reporting.html.final_mark import with_final_mark
@@ -38,7 +38,7 @@ def add_marks(pages: list[HandedBack]) -> Iterator[str]:
     for each in pages:
         folder = each.evidence.resolve().parent
         mark = _mark(folder)
-        if mark is not None and fits(mark, each.report):
+        if mark is not None and mark_fits(mark, each.report):
             _mark_page(each.page, mark, each.report)
         elif mark is not None:
             unfit.append(each.name)

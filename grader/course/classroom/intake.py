@@ -21,8 +21,8 @@ from grader.course.classroom.downloads import (
     PATTERNS,
     DownloadLayout,
     Named,
-    is_program,
-    layout_of,
+    download_layout,
+    is_gradable,
     unpack_download,
     write_without_content,
 )
@@ -38,7 +38,7 @@ from grader.grading.submissions.submission import read_start
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError, SubmissionError
 from grader.runtime.model.limits import MAX_ARCHIVE_BYTES
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 #: Longest name, in bytes of UTF-8, not counting the suffix that makes it unique.
 MAX_BYTES = 80
@@ -73,7 +73,7 @@ def _mark(text: str) -> str:
 
 
 #: What makes a folder one with the results of a class.
-_OF_RESULTS = ("run.json", "students", "assets")
+_OF_RESULTS = ("class.yaml", "students", "assets")
 _TWO_WAYS = "its name can be read in two ways, so it is in nobody's submission"
 
 
@@ -161,7 +161,7 @@ def check_places(sources: Sequence[Path], results: Path) -> None:
         if not source.is_dir():
             continue
         if top == place or (top in place.parents and place.parent != top):
-            hint = f"name a folder beside the submissions, for example -o {shown(str(source), 200)}-results"
+            hint = f"name a folder beside the submissions, for example -o {printable(str(source), 200)}-results"
             raise ClassError(f"{results}: expected a folder for results, found that it is among the submissions", hint)
         if any(top.is_relative_to(place / name) for name in ("students", "unpacked", "assets")):
             hint = "name the folder or the download that the submissions come from"
@@ -177,8 +177,8 @@ def _each_once(sources: Sequence[Path], strays: list[str]) -> Iterator[Path]:
             kept.append(source)
             yield source
         else:
-            which = "" if str(same) == str(source) else f", first as {shown(str(same), 200)}"
-            strays.append(f"{shown(str(source), 200)}: given twice{which}, so it is counted once")
+            which = "" if str(same) == str(source) else f", first as {printable(str(same), 200)}"
+            strays.append(f"{printable(str(source), 200)}: given twice{which}, so it is counted once")
 
 
 def _is_same(source: Path, other: Path) -> bool:
@@ -206,7 +206,7 @@ def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[
 def _layout(children: Sequence[Path], top: Path, wanted: str, pattern: str) -> DownloadLayout:
     """Determine the layout of a folder; plain files count only if there are no folders or archives."""
     names = [child.name for child in children if child.is_dir() or _is_archive(child)]
-    return layout_of(wanted, pattern, top.resolve().name, names or [child.name for child in children])
+    return download_layout(wanted, pattern, top.resolve().name, names or [child.name for child in children])
 
 
 def _submissions(children: Sequence[Path], own: str, layout: DownloadLayout, strays: list[str]) -> _ByStudent:
@@ -214,11 +214,11 @@ def _submissions(children: Sequence[Path], own: str, layout: DownloadLayout, str
     doubtful: list[tuple[tuple[str, ...], _Found]] = []
     for child in children:
         if child.is_symlink():
-            strays.append(f"{shown(str(child), 200)}: a link, which is not followed")
+            strays.append(f"{printable(str(child), 200)}: a link, which is not followed")
             continue
         named, label = _read(layout, child)
         if not child.is_dir() and not _is_archive(child) and not named.file:
-            strays.append(f"{shown(str(child), 200)}: neither a folder nor an archive")
+            strays.append(f"{printable(str(child), 200)}: neither a folder nor an archive")
             continue
         key, one = _student(child.name, named, layout), _found(child, label, own, named, layout)
         if named.doubtful:
@@ -228,7 +228,7 @@ def _submissions(children: Sequence[Path], own: str, layout: DownloadLayout, str
     certain = set(found)
     for key, one in doubtful:
         if layout.name == MOODLE or key in certain:
-            strays.append(f"{shown(str(one.path), 200)}: {_TWO_WAYS}")
+            strays.append(f"{printable(str(one.path), 200)}: {_TWO_WAYS}")
         else:
             _add(found, key, one)
     return found
@@ -304,7 +304,7 @@ def _put_together(one: _Found, into: Path, wanted: Collection[str], strays: list
             for name in names if not path.is_dir() else ():
                 wrong = name_problem(name)
                 if wrong:
-                    strays.append(f"{shown(str(path), 200)}: {wrong}, so it is left out of its submission")
+                    strays.append(f"{printable(str(path), 200)}: {wrong}, so it is left out of its submission")
                 else:
                     (into / name).parent.mkdir(parents=True, exist_ok=True)
                     _copy(str(path), str(into / name))
@@ -326,12 +326,12 @@ def _copy(source: str, target: str) -> str:
     path, wish = Path(source), Path(target)
     size = path.stat().st_size
     most = MAX_ARCHIVE_BYTES if _is_archive(path) else USUAL.file_bytes
-    content = read_start(path, most, where=shown(source, 200)) if size <= most else None
+    content = read_start(path, most, where=printable(source, 200)) if size <= most else None
     same = content is not None and wish.is_file() and wish.read_bytes() == content
     if wish.exists() and not same:
-        if is_program(wish.name):
+        if is_gradable(wish.name):
             raise SubmissionError(
-                f"expected files with different names, found two different ones named {shown(wish.name)}"
+                f"expected files with different names, found two different ones named {printable(wish.name)}"
             )
         numbers = (wish.with_name(f"{wish.stem} ({number}){wish.suffix}") for number in itertools.count(2))
         wish = next(path for path in numbers if not path.exists())
@@ -356,9 +356,9 @@ def _children(folder: Path, strays: list[str]) -> Iterator[Path]:
         is_folder = path.is_dir()
         why = why_skipped(name, is_folder=is_folder)
         if is_folder and all((path / inside).exists() for inside in _OF_RESULTS):
-            strays.append(f"{shown(str(path), 200)}: the results of a class, so it is not graded")
+            strays.append(f"{printable(str(path), 200)}: the results of a class, so it is not graded")
         elif why:
-            strays.append(f"{shown(str(path), 200)}: {why}, so it is not graded")
+            strays.append(f"{printable(str(path), 200)}: {why}, so it is not graded")
         elif not (is_skipped_folder(name) if is_folder else is_skipped_file(name)):
             yield path
 

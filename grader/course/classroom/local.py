@@ -226,7 +226,7 @@ class GradingProcesses:
         while line := process.stdout.readline(_LINE_BYTES):
             message = _message(line)
             if "done" in message:
-                return kept.load(json.dumps(message["done"]).encode())
+                return kept.load_status(json.dumps(message["done"]).encode())
             if "step" in message:
                 grading.on_step(grading.task.name, str(message["step"]))
             if "wall_clock" in message:

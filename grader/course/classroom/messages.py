@@ -83,12 +83,12 @@ class _Reading:
     notes: tuple[bytes, ...]
 
 
-def pack(message: Terms | GradingJob | JobResult | Fitness | Parcel) -> bytes:
+def pack_message(message: Terms | GradingJob | JobResult | Fitness | Parcel) -> bytes:
     """Encode a message."""
     return msgspec.msgpack.encode(message, enc_hook=os.fsencode)  # a path, which need not be valid text
 
 
-def unpack(data: bytes, kind: type[_Message]) -> _Message:
+def unpack_message(data: bytes, kind: type[_Message]) -> _Message:
     """Decode a message; raises HarnessError for anything else."""
     try:
         return msgspec.msgpack.decode(data, type=kind, dec_hook=_path)
@@ -110,7 +110,7 @@ def pack_collected(collected: Collected) -> bytes:
 
 def read_collected(data: bytes) -> Collected:
     """Decode the files of a submission; raises HarnessError for anything else."""
-    reading = unpack(data, _Reading)
+    reading = unpack_message(data, _Reading)
     files = tuple((os.fsdecode(name), content) for name, content in reading.files)
     for name, _ in files:
         if os.path.isabs(name) or ".." in name.split("/"):  # noqa: PTH117  a name from elsewhere, not a path here
@@ -123,7 +123,7 @@ def travelling_name(path: Path) -> bytes:
     return os.fsencode(os.path.relpath(path) if path.is_absolute() else os.path.normpath(path))
 
 
-def files_below(folder: Path) -> Files:
+def plain_files(folder: Path) -> Files:
     """Read the plain files in a folder, ordered by their relative paths."""
     paths = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
     return tuple((os.fsencode(path.relative_to(folder)), path.read_bytes()) for path in paths)

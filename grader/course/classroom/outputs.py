@@ -11,7 +11,15 @@ from pathlib import Path
 from grader.course.class_page.contents import PageLink
 from grader.course.class_page.render import class_assets, render_class
 from grader.course.classroom.class_page import RunOfClass, class_page
-from grader.course.classroom.gradebook import Gradebook, Row, Status, decision_line, number, remarks, render_gradebook
+from grader.course.classroom.gradebook import (
+    Gradebook,
+    Row,
+    Status,
+    decision_line,
+    points_text,
+    render_gradebook,
+    row_remarks,
+)
 from grader.course.classroom.platforms import (
     Export,
     export_canvas,
@@ -137,7 +145,7 @@ class Graded:
     links: tuple[PageLink, ...] = ()  # further pages in the results folder, linked from the class page
 
 
-def render_summary(graded: Graded) -> str:
+def render_graded(graded: Graded) -> str:
     """Summarise the class in a few lines: counts, scores, and everybody who needs attention."""
     book = graded.book
     lines = [f"graded now: {graded.graded}{_how(graded.now)}, done before: {graded.kept_before}"]
@@ -206,7 +214,7 @@ def _row(row: Row, *, exported: bool) -> JsonObject:
         "reason": json_value(adjusted.reason) or None,
         "decision": json_value(decision_line(row)) or None,
         "problem": json_value(row.problem) or None,
-        "remarks": json_value(remarks(row)),
+        "remarks": json_value(row_remarks(row)),
         "outdated": row.outdated,
         "exported": exported,
         "platform_ids": {} if person is None else json_value(person.platform_ids),
@@ -265,7 +273,7 @@ def _lists(book: Gradebook, not_replaced: Sequence[str]) -> Iterator[str]:
 
 def _points(row: Row) -> str:
     score = None if row.report is None else row.report["score"]
-    return f"{number(score)}/{number(row.max_score)} so far"
+    return f"{points_text(score)}/{points_text(row.max_score)} so far"
 
 
 def _list(title: str, names: Sequence[str]) -> Iterator[str]:

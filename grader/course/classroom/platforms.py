@@ -9,13 +9,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
 
 from grader.course.classroom.final_marks import criteria_of, decisions
-from grader.course.classroom.gradebook import Gradebook, Row, exercises_of, number, table, text_cell
+from grader.course.classroom.gradebook import Gradebook, Row, points_text, report_exercises, table, text_cell
 from grader.course.classroom.roster import Person, Table, row_of
 from grader.grading.reporting.escape import shown as safe
 from grader.grading.reporting.json_report import CriterionData, json_text
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 #: The columns that Canvas requires before the scores, in this order.
 CANVAS_COLUMNS = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
@@ -52,9 +52,9 @@ def export_canvas(book: Gradebook, assignment: str, gradebook: Table | None) -> 
             where = "the roster" if gradebook is None else gradebook.path.name
             left_out.append(f"{row.distinct_name}: {where} has no Canvas number (column ID) for this person")
         else:
-            rows.append([*(text_cell(found.get(name, "")) for name in CANVAS_COLUMNS), number(row.adjusted.score)])
-    possible = _possible(gradebook, title) or number(max(maxima, default=None))
-    ours = listed([number(points) for points in sorted(maxima)] or [possible])
+            rows.append([*(text_cell(found.get(name, "")) for name in CANVAS_COLUMNS), points_text(row.adjusted.score)])
+    possible = _possible(gradebook, title) or points_text(max(maxima, default=None))
+    ours = listed([points_text(points) for points in sorted(maxima)] or [possible])
     remark = "" if ours == possible else _line(f"{title} has {possible} points in Canvas, the reports have {ours}")
     header = [*CANVAS_COLUMNS, text_cell(title)]
     points = ["    Points Possible", *[""] * (len(CANVAS_COLUMNS) - 1), text_cell(possible)]
@@ -72,7 +72,7 @@ def export_moodle(book: Gradebook, users: Table) -> Export:
     by_name = {name.strip().casefold(): name for name in users.header}
     column = next((name for name in MOODLE_COLUMNS if name.casefold() in by_name), None)
     if column is None:
-        found = listed([shown(name, 30) for name in users.header[:6]], "and")
+        found = listed([printable(name, 30) for name in users.header[:6]], "and")
         raise ClassError(f"{users.path}:1: expected a column {listed(MOODLE_COLUMNS)}, found {found}")
     rows: list[list[str]] = []
     left_out: list[str] = []
@@ -86,7 +86,7 @@ def export_moodle(book: Gradebook, users: Table) -> Export:
         elif text_cell(value) != value:
             left_out.append(f"{row.distinct_name}: {column} looks like a formula of a spreadsheet")
         else:
-            rows.append([value, number(row.adjusted.score), text_cell(html.escape(feedback(row), quote=False))])
+            rows.append([value, points_text(row.adjusted.score), text_cell(html.escape(feedback(row), quote=False))])
     return Export({"moodle.csv": table([column, "Grade", "Feedback"], rows)}, tuple(map(_line, left_out)))
 
 
@@ -98,7 +98,7 @@ def export_gradescope(book: Gradebook, results: Mapping[str, str]) -> Export:
     for row in _counted(book, left_out):
         person = row.person or Person(row.label)
         texts = [text_cell(text) for text in (person.name, person.id, person.email)]
-        rows.append([*texts, number(row.adjusted.score), number(row.max_score), "Graded"])
+        rows.append([*texts, points_text(row.adjusted.score), points_text(row.max_score), "Graded"])
         if row.name in results:
             files[f"gradescope/{row.name}/results.json"] = _decided(results[row.name], row)
     return Export({"gradescope.csv": table(GRADESCOPE_COLUMNS, rows), **files}, tuple(map(_line, left_out)))
@@ -122,15 +122,15 @@ def feedback(row: Row) -> str:
     if row.report is None:
         said = [f"Not graded: {row.refusal}." if row.refusal else "", f"Hint: {row.hint}." if row.hint else ""]
         return safe(" ".join(part for part in (*said, *decisions(row)) if part), limit=_FEEDBACK)
-    parts = [f"{number(row.adjusted.score)} of {number(row.max_score)} points.", *decisions(row)]
+    parts = [f"{points_text(row.adjusted.score)} of {points_text(row.max_score)} points.", *decisions(row)]
     parts += _first_hint(row)
-    parts += [_lost(criterion) for exercise in exercises_of(row.handed_back) for criterion in exercise["criteria"]]
+    parts += [_lost(criterion) for exercise in report_exercises(row.handed_back) for criterion in exercise["criteria"]]
     return safe(" ".join(part for part in parts if part), limit=_FEEDBACK)
 
 
 def _first_hint(row: Row) -> list[str]:
     """Return the first thing to do, as far as the student may see it."""
-    criteria = [criterion for exercise in exercises_of(row.handed_back) for criterion in exercise["criteria"]]
+    criteria = [criterion for exercise in report_exercises(row.handed_back) for criterion in exercise["criteria"]]
     lost = [c["hint"] for c in criteria if c["outcome"] in ("not_met", "partly") and c.get("hint")]
     return [f"First hint: {lost[0]}."] if lost else []
 
@@ -138,7 +138,7 @@ def _first_hint(row: Row) -> list[str]:
 def _lost(criterion: CriterionData) -> str:
     if criterion["outcome"] == "met":
         return ""
-    points = f"{number(criterion['score'])}/{number(criterion['max_score'])}"
+    points = f"{points_text(criterion['score'])}/{points_text(criterion['max_score'])}"
     return f"[{points}] {criterion['title']}: {criterion['reason']}"
 
 
@@ -164,7 +164,7 @@ def _canvas_title(assignment: str, gradebook: Table | None) -> str:
     number_ = re.fullmatch(r"(?:.*\()?(\d+)\)?", assignment.strip(), re.DOTALL)
     if number_ is None:
         hint = "open the assignment in Canvas: the number is at the end of its address"
-        raise ClassError(f"--canvas: expected an assignment's number, found {shown(assignment)}", hint)
+        raise ClassError(f"--canvas: expected an assignment's number, found {printable(assignment)}", hint)
     if gradebook is None:
         return assignment.strip() if "(" in assignment else f"Assignment ({number_[1]})"
     title = next((name for name in gradebook.header if name.rstrip().endswith(f"({number_[1]})")), None)

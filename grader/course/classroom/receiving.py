@@ -22,9 +22,9 @@ from grader.course.classroom.messages import (
     JobResult,
     Parcel,
     Terms,
-    files_below,
-    pack,
-    unpack,
+    pack_message,
+    plain_files,
+    unpack_message,
 )
 from grader.course.classroom.store import ResultStatus, State
 from grader.grading.model.grading_options import paths
@@ -65,18 +65,18 @@ def grade_job(terms: Terms, job: GradingJob, machine: str, on_step: Callable[[st
         with _alone() if _one_at_a_time(choice) else nullcontext(), scratch_folder() as scratch:
             return _graded(terms, job, scratch, machine, on_step)
     except GraderError as error:
-        return failure(machine, error.message, error.hint)
+        return failed_answer(machine, error.message, error.hint)
     except OSError as error:
-        return failure(machine, f"the submission cannot be laid out or read back: {error.strerror}")
+        return failed_answer(machine, f"the submission cannot be laid out or read back: {error.strerror}")
 
 
 def _graded(terms: Terms, job: GradingJob, scratch: Path, machine: str, on_step: Callable[[str], None]) -> JobResult:
     task = write_task(terms, job, scratch)
     attempt = _PROCESSES.grade(Grading(task, lambda _, step: on_step(step), _start(terms, scratch), class_=terms))
-    files = files_below(task.into) if task.into.is_dir() else ()
+    files = plain_files(task.into) if task.into.is_dir() else ()
     if sum(len(content) for _, content in files) > MAX_ANSWER_BYTES:
-        return failure(machine, f"the result holds more than {MAX_ANSWER_BYTES >> 20} MiB")
-    return JobResult(machine, kept.dump(_status_with_machine(attempt, machine)), files)
+        return failed_answer(machine, f"the result holds more than {MAX_ANSWER_BYTES >> 20} MiB")
+    return JobResult(machine, kept.dump_status(_status_with_machine(attempt, machine)), files)
 
 
 def _status_with_machine(attempt: Attempt, machine: str) -> ResultStatus:
@@ -87,9 +87,9 @@ def _status_with_machine(attempt: Attempt, machine: str) -> ResultStatus:
     return replace(status, problem=f"{machine}: {status.problem}")
 
 
-def failure(machine: str, problem: str, hint: str = AGAIN) -> JobResult:
+def failed_answer(machine: str, problem: str, hint: str = AGAIN) -> JobResult:
     """Build the answer for a failure of this machine, which never counts as a mark."""
-    return JobResult(machine, kept.dump(ResultStatus(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
+    return JobResult(machine, kept.dump_status(ResultStatus(State.FAILED, "", "", "", f"{machine}: {problem}", hint)))
 
 
 def write_task(terms: Terms, job: GradingJob, scratch: Path) -> Task:
@@ -169,24 +169,24 @@ def grade_packed(parcel: bytes, on_step: Callable[[str], None] = _unheard) -> by
     """
     machine = socket.gethostname()
     try:
-        given = unpack(parcel, Parcel)
+        given = unpack_message(parcel, Parcel)
     except HarnessError as error:
-        return pack(JobResult(machine, unfit=error.message, hint=error.hint))
+        return pack_message(JobResult(machine, unfit=error.message, hint=error.hint))
     return answer(given.version, given.terms, given.job, machine, on_step)
 
 
 def answer(version: str, terms: bytes, job: bytes, machine: str, on_step: Callable[[str], None]) -> bytes:
     """Grade a submission for a grader of this version, and return a packed `JobResult`; see `grade_packed`."""
     if version != grader.__version__:
-        return pack(JobResult(machine, unfit=other_version(version, grader.__version__), hint=remedy(version)))
+        return pack_message(JobResult(machine, unfit=other_version(version, grader.__version__), hint=remedy(version)))
     try:
-        return pack(grade_job(unpack(terms, Terms), unpack(job, GradingJob), machine, on_step))
+        return pack_message(grade_job(unpack_message(terms, Terms), unpack_message(job, GradingJob), machine, on_step))
     except UnwantedError:
         raise
     except HarnessError as error:
-        return pack(JobResult(machine, unfit=error.message, hint=error.hint))
+        return pack_message(JobResult(machine, unfit=error.message, hint=error.hint))
     except Exception as error:  # the last line of defence: a bug of the grader must not look like a low score
-        return pack(failure(machine, f"the grader failed: {type(error).__name__}: {error}"))
+        return pack_message(failed_answer(machine, f"the grader failed: {type(error).__name__}: {error}"))
 
 
 def other_version(wanted: str, found: str) -> str:

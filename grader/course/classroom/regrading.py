@@ -12,7 +12,7 @@ from pathlib import Path
 
 from grader.course.classroom.local import Attempt, Task, failed_attempt
 from grader.course.classroom.store import Conditions, ResultStatus, State
-from grader.course.classroom.worker import EVIDENCE, request_of_task, status_of, write_reports
+from grader.course.classroom.worker import EVIDENCE, request_of_task, result_status, write_reports
 from grader.grading.app.kept_recordings import PlannedRun, recorded_alike
 from grader.grading.app.rejudge import WORTH_A_POOL, judged_again
 from grader.grading.app.request import request_to_json
@@ -110,4 +110,4 @@ def _judged(task: Task, kept: KeptRecordings) -> ResultStatus:
     write_reports(report, task)
     asked = request_to_json(request, kept.exercises)
     carry_over(evidence, task.into / EVIDENCE, request=asked, report=dumps(report).encode())
-    return status_of(report, task)
+    return result_status(report, task)

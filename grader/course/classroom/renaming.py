@@ -10,11 +10,11 @@ from pathlib import Path, PurePosixPath
 
 from grader.course.classroom.adjustments import Decision
 from grader.course.classroom.intake import HandedInEntry
-from grader.grading.rubrics.mistakes import nearest
+from grader.grading.rubrics.mistakes import nearest_hint
 from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.submission import every_file, write_files
 from grader.runtime.model.errors import ClassError, SubmissionError
-from grader.runtime.model.wording import first_of, shown
+from grader.runtime.model.wording import first_of, printable
 
 _RENAMED = "renamed"
 
@@ -53,17 +53,17 @@ def _with_new_names(collected: Collected, decision: Decision, name: str) -> Iter
     new_names = {}
     for old, new in decision.rename.items():
         found = [path for path in names if old in (path, PurePosixPath(path).name)]
-        where = f"{decision.where}: {shown(name, 80)}"
+        where = f"{decision.where}: {printable(name, 80)}"
         if not found:
-            hint = nearest(old, [PurePosixPath(path).name for path in names])
-            raise ClassError(f"{where}: expected the file `{shown(old)}` to rename, found {first_of(names)}", hint)
+            hint = nearest_hint(old, [PurePosixPath(path).name for path in names])
+            raise ClassError(f"{where}: expected the file `{printable(old)}` to rename, found {first_of(names)}", hint)
         if len(found) > 1:
             hint = f"write one of the paths: {first_of(found)}"
-            raise ClassError(f"{where}: expected one file `{shown(old)}` to rename, found {len(found)}", hint)
+            raise ClassError(f"{where}: expected one file `{printable(old)}` to rename, found {len(found)}", hint)
         new_names[found[0]] = str(PurePosixPath(found[0]).with_name(new))
     for path, content in collected.files:
         target = new_names.get(path, path)
         if target != path and target in names and target not in new_names:
-            text = f"expected a new name for `{shown(path)}`, found that there is a file `{shown(target)}`"
-            raise ClassError(f"{decision.where}: {shown(name, 80)}: {text}")
+            text = f"expected a new name for `{printable(path)}`, found that there is a file `{printable(target)}`"
+            raise ClassError(f"{decision.where}: {printable(name, 80)}: {text}")
         yield target, content

@@ -16,7 +16,7 @@ from grader.course.classroom.downloads import CANVAS, CLASSROOM50, GITHUB, MOODL
 from grader.course.classroom.intake import HandedInEntry
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 #: Largest CSV file that is read, and most rows.
 MAX_BYTES = 8 << 20
@@ -152,7 +152,7 @@ def read_roster(path: Path) -> list[Person]:
     columns = columns_of(table.header)
     if not columns:
         known = listed([names[0] for names in COLUMNS.values()])
-        found = listed([shown(name, 30) for name in table.header[:6]], "and")
+        found = listed([printable(name, 30) for name in table.header[:6]], "and")
         raise ClassError(f"{path}:1: expected a column {known}, found {found}", "name the columns in the first line")
     return [person for person in table.people if person.name and not _is_no_person(person.row or {})]
 

@@ -44,7 +44,7 @@ class ThisMachine:
     make: MakeScheduler = local.LocalScheduler
 
 
-def opened(
+def opened_scheduler(
     scheduler: str | None, jobs: int | None, warn: Callable[[str], None], here: ThisMachine
 ) -> AbstractContextManager[MakeScheduler]:
     """Return the context of what grades a class, from the value of `--scheduler`; None is this machine.
@@ -53,13 +53,13 @@ def opened(
     """
     if scheduler is None:
         return nullcontext(here.make)
-    name, place = named(scheduler)
-    found = entry_points.load(SCHEDULERS, name, object, "a function")
+    name, place = scheduler_name(scheduler)
+    found = entry_points.load_registered(SCHEDULERS, name, object, "a function")
     if found is None and name == DASK:
         lost = f"rclpy-grader: expected its entry point {DASK!r} of {SCHEDULERS}, found none"
         raise EnvironmentFault(lost, "install it again: its metadata are older than its code")
     if found is None:
-        known = ", ".join(entry_points.names(SCHEDULERS))
+        known = ", ".join(entry_points.registered_names(SCHEDULERS))
         raise ClassError(f"--scheduler {scheduler}: expected a scheduler, found {name!r}", f"there are {known}")
     connect, where = found
     if not callable(connect):
@@ -67,11 +67,11 @@ def opened(
     return _connected(connect, where, place, jobs, warn)
 
 
-def named(text: str) -> tuple[str, str]:
+def scheduler_name(text: str) -> tuple[str, str]:
     """Return name and place of `NAME=PLACE` or `NAME`; an address and a file are those of Dask."""
     name, equals, place = text.partition("=")
     is_name = entry_points.NAME.fullmatch(name) is not None and not Path(text).exists()
-    if is_name and (equals or name in entry_points.names(SCHEDULERS)):
+    if is_name and (equals or name in entry_points.registered_names(SCHEDULERS)):
         return name, place
     return DASK, text
 

@@ -18,11 +18,11 @@ from grader.course.classroom.messages import (
     JobResult,
     Parcel,
     Terms,
-    files_below,
-    pack,
     pack_collected,
+    pack_message,
+    plain_files,
     travelling_name,
-    unpack,
+    unpack_message,
     write_answer,
 )
 from grader.course.classroom.store import ResultStatus, State, refused
@@ -123,7 +123,7 @@ def doubt(task: Task, status: object) -> str:
 
 def store_result(task: Task, answer: JobResult) -> Attempt:
     """Write the result from an answer into the task's folder."""
-    status = kept.load(answer.status)
+    status = kept.load_status(answer.status)
     if status is None:
         return failed_attempt(task, f"{answer.machine}: expected a result, found something else")
     if wrong := doubt(task, status):
@@ -147,7 +147,7 @@ def pack_task(task: Task) -> bytes | Attempt:
     job = job_for(task, files_wanted(task))
     if isinstance(job, Attempt):
         return job
-    return pack(Parcel(grader.__version__, pack(terms_of(task)), pack(job)))
+    return pack_message(Parcel(grader.__version__, pack_message(terms_of(task)), pack_message(job)))
 
 
 def store_answer(task: Task, answer: object, machine: str) -> Attempt:
@@ -165,7 +165,7 @@ def answer_in(data: object, machine: str) -> JobResult:
     """Unpack an answer from the cluster; invalid data becomes an empty result, which counts as a failure."""
     try:
         if isinstance(data, bytes):
-            return unpack(data, JobResult)
+            return unpack_message(data, JobResult)
     except HarnessError:
         pass
     return JobResult(machine)
@@ -180,6 +180,6 @@ def _content(path: Path) -> bytes:
 
 def _recording(path: Path) -> Files:
     try:
-        return files_below(path) if path.is_dir() else ((b"", path.read_bytes()),)
+        return plain_files(path) if path.is_dir() else ((b"", path.read_bytes()),)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None

@@ -17,7 +17,7 @@ from typing import Any
 
 import msgspec
 
-from grader.grading.app.spot_checks import is_drawn
+from grader.grading.app.spot_checks import is_spot_checked
 from grader.grading.model.exercise import Drawn
 from grader.grading.model.grading_options import GradingOptions, key_values
 from grader.grading.reporting.escape import json_value
@@ -61,12 +61,12 @@ class ResultStatus:
     schema: str = SCHEMA  # version of this format
 
 
-def dump(status: ResultStatus) -> bytes:
+def dump_status(status: ResultStatus) -> bytes:
     """Encode a status as JSON; invalid text in names is replaced."""
     return json.dumps(json_value(asdict(status)), indent=2).encode() + b"\n"
 
 
-def load(data: bytes) -> ResultStatus | None:
+def load_status(data: bytes) -> ResultStatus | None:
     """Decode a status; None for invalid data or another version."""
     try:
         status = msgspec.json.decode(data, type=ResultStatus)
@@ -138,11 +138,11 @@ class Store:
         try:
             before = self.kept(name).result
             if before is not None and before.state.worth > status.state.worth:
-                write_whole(place / ATTEMPT, dump(status))
+                write_whole(place / ATTEMPT, dump_status(status))
                 shutil.rmtree(fresh, ignore_errors=True)
                 return False
             fresh.mkdir(exist_ok=True)
-            write_whole(fresh / RESULT, dump(status))
+            write_whole(fresh / RESULT, dump_status(status))
             _sync(fresh)
             self._swap(fresh, place)
         except OSError as error:
@@ -260,7 +260,7 @@ def _name_in(line: bytes) -> str:
 
 def _read(path: Path) -> ResultStatus | None:
     with suppress(OSError):
-        return load(path.read_bytes())
+        return load_status(path.read_bytes())
     return None
 
 
@@ -302,7 +302,7 @@ class Conditions:
 
     def draws(self, submission: str) -> bool:
         """Return whether a submission is drawn for a spot check, given its digest."""
-        return is_drawn(self.options.spot_checks, self.options.seed or 0, submission)
+        return is_spot_checked(self.options.spot_checks, self.options.seed or 0, submission)
 
     def of_submission(self, seed: int | None, variants: Drawn | None) -> Conditions:
         """Return the conditions of one submission: with its own seed and variant."""

@@ -64,7 +64,7 @@ def main() -> None:
             os.chdir(request["folder"])
             task = msgspec.convert(request["task"], Task, dec_hook=lambda type_, value: type_(value))
             status = attempt(task, lambda step: _send({"step": step}), sessions.grade, sessions.ended_s)
-            _send({"done": json.loads(kept.dump(status))})
+            _send({"done": json.loads(kept.dump_status(status))})
 
 
 class Sessions:
@@ -82,7 +82,7 @@ class Sessions:
     def grade(
         self, request: GradeRequest, progress: Progress, on_recorded: Callable[[Run, Sequence[Exercise]], None]
     ) -> Report:
-        """Grade a submission in a session that is opened if there is none for the request yet; see `grade`."""
+        """Grade a submission in a session that is opened if there is none for the request yet; see `grade_in`."""
         started = time.perf_counter()
         wanted = (request.isolation, request.workers)
         if wanted not in self._opened:
@@ -126,7 +126,7 @@ def _graded(task: Task, progress: Progress, grade: Grade) -> ResultStatus:
     progress("writing the results")
     write_reports(report, task)
     writer.write(report)
-    return status_of(report, task)
+    return result_status(report, task)
 
 
 def request_of_task(task: Task) -> GradeRequest:
@@ -150,7 +150,7 @@ def write_reports(report: Report, task: Task) -> None:
         write_whole(task.into / name, text.encode())
 
 
-def status_of(report: Report, task: Task) -> ResultStatus:
+def result_status(report: Report, task: Task) -> ResultStatus:
     """Return the status of a submission with a report."""
     return ResultStatus(
         state=State.GRADED if report.final else State.UNDECIDED,

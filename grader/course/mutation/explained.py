@@ -18,12 +18,12 @@ from grader.grading.rubrics.mistakes import (
     YamlSyntaxError,
     YamlTree,
     mistakes_of,
-    nearest,
+    nearest_hint,
     read_yaml,
 )
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 SCHEMA = "grader/selftest-notes/v1"
 MAX_BYTES = 256 * 1024
@@ -108,7 +108,7 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
 
     def where(*at: str | int) -> str:
         place = tree.values[at]
-        return f"{shown(str(path), 500)}:{place.line}:{place.column}"
+        return f"{printable(str(path), 500)}:{place.line}:{place.column}"
 
     def reasons(key: str, notes: Sequence[tuple[str, str | None]]) -> Iterator[Explanation]:
         for n, (pattern, because) in enumerate(notes):
@@ -127,7 +127,7 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
 
 
 def _tree(path: Path) -> YamlTree:
-    where = shown(str(path), 500)
+    where = printable(str(path), 500)
     try:
         data = path.read_bytes()
         if len(data) > MAX_BYTES:
@@ -142,7 +142,7 @@ def _tree(path: Path) -> YamlTree:
 
 
 def _refuse(path: Path, mistakes: Sequence[Mistake]) -> NoReturn:
-    where, ordered = shown(str(path), 500), sorted(set(mistakes))
+    where, ordered = printable(str(path), 500), sorted(set(mistakes))
     lines = [f"{where}:{m.line}:{m.column}: {m.text}" for m in ordered]
     raise RubricError("\n".join(lines), next((m.hint for m in ordered if m.hint), ""))
 
@@ -154,5 +154,5 @@ def _unknown_criteria(read: _File, tree: YamlTree, exercise: Exercise) -> Iterat
         named |= {("expected", n, "killed_by", k): id_ for k, id_ in enumerate(one.killed_by)}
     for at, id_ in named.items():
         if id_ not in known:
-            text = f"expected a criterion of {exercise.id} ({listed(known)}), found `{shown(id_)}`"
-            yield tree.values[at].mistake(text, nearest(id_, known))
+            text = f"expected a criterion of {exercise.id} ({listed(known)}), found `{printable(id_)}`"
+            yield tree.values[at].mistake(text, nearest_hint(id_, known))

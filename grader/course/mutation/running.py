@@ -41,7 +41,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.plan import Surroundings
 from grader.runtime.session import Job, RecordingSession, TestJob, open_session, planned_clock
 
@@ -297,7 +297,7 @@ def _unfilled(explained: Explained) -> Iterator[str]:
     """Yield the notes whose reason is still to be filled in."""
     for note in (*explained.survivors, *explained.variants):
         if not note.because:
-            yield f"{note.where}: `{shown(note.pattern)}` needs a reason after `because:`"
+            yield f"{note.where}: `{printable(note.pattern)}` needs a reason after `because:`"
     for id_, because in explained.criteria.items():
         if not because:
             yield f"{id_}: the note needs a reason after `because:`"
@@ -313,7 +313,7 @@ def _idle(explained: Explained, mutants: Sequence[Trial], variants: Sequence[Tri
     unused = (note for notes, ids in concerned for note in notes if not any(map(note.fits, ids)))
     turned = {id_ for trial in mutants for id_ in trial.result.turned}
     return (
-        *(f"{note.where}: nothing matches `{shown(note.pattern)}`" for note in unused),
+        *(f"{note.where}: nothing matches `{printable(note.pattern)}`" for note in unused),
         *(
             f"{id_}: the notes say why it detects no mutant, but it detects some"
             for id_ in explained.criteria

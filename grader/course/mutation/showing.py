@@ -24,7 +24,7 @@ _MOST_LINES = 30
 _GOOD, _BAD, _QUIET = "green", "bold red", "dim"
 
 
-def render_results(results: Sequence[SelftestResult], *, width: int, colour: bool) -> str:
+def render_selftest(results: Sequence[SelftestResult], *, width: int, colour: bool) -> str:
     """Render the results as text, at least 80 columns wide; the words are the same without ANSI colours."""
     out = StringIO()
     console = Console(
@@ -172,7 +172,7 @@ def _points(points: Fraction) -> str:
     return f"{round(float(points), 3):g}"
 
 
-def results_to_json(results: Sequence[SelftestResult]) -> str:
+def selftest_to_json(results: Sequence[SelftestResult]) -> str:
     """Render the results of rubrics as JSON, as described by selftest.schema.json."""
     data = {"schema": SCHEMA, "passed": all(r.passed for r in results), "rubrics": [_as_data(r) for r in results]}
     return json.dumps(data, indent=2, allow_nan=False) + "\n"

@@ -13,7 +13,7 @@ from grader.course.mutation.explained import SCHEMA
 from grader.course.mutation.results import SelftestResult, Trial
 from grader.grading.model.rubric_files import notes_on
 from grader.runtime.model.errors import GraderError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 #: Most lines of a change that stand above an entry.
 _MOST_LINES = 8
@@ -59,16 +59,16 @@ def _of_trials(trials: Sequence[Trial], key: str) -> Iterator[list[str]]:
     """Yield the lines of an entry for each pattern, the change above it, without `because:`."""
     seen: set[str] = set()
     for trial in trials:
-        pattern = pattern_of(trial)
+        pattern = trial_pattern(trial)
         if pattern in seen:
             continue
         seen.add(pattern)
         lines = trial.diff.splitlines()
         more = [f"# ... {len(lines) - _MOST_LINES} more lines"] if len(lines) > _MOST_LINES else []
-        yield [*(f"# {shown(line, 110)}" for line in lines[:_MOST_LINES]), *more, f"- {key}: {_scalar(pattern)}"]
+        yield [*(f"# {printable(line, 110)}" for line in lines[:_MOST_LINES]), *more, f"- {key}: {_scalar(pattern)}"]
 
 
-def pattern_of(trial: Trial) -> str:
+def trial_pattern(trial: Trial) -> str:
     """Return a pattern that fits a trial at any line, so that it still fits after a change of the reference."""
     file, rest = glob.escape(trial.file), glob.escape(trial.id.removeprefix(f"{trial.file}:"))
     return f"{file}:{re.sub(r'^[0-9]+:', '*:', rest)}"
@@ -88,8 +88,8 @@ def _added(text: str, key: str, entries: Sequence[Sequence[str]], path: Path) ->
     start, found = tops[here]
     value = found[2].partition(" #")[0].strip()
     if value not in ("", "[]"):
-        place = f"{shown(str(path), 500)}:{start + 1}"
-        raise GraderError(f"{place}: expected a line for each entry under `{key}`, found `{shown(value, 60)}`")
+        place = f"{printable(str(path), 500)}:{start + 1}"
+        raise GraderError(f"{place}: expected a line for each entry under `{key}`, found `{printable(value, 60)}`")
     lines[start] = f"{key}:"
     stop = tops[here + 1][0] if here + 1 < len(tops) else len(lines)
     while stop > start + 1 and (not lines[stop - 1].strip() or lines[stop - 1].startswith("#")):

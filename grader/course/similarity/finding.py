@@ -36,7 +36,7 @@ MAX_BYTES = 64 << 10
 MAX_ALL_BYTES = 2 * MAX_BYTES
 
 
-def read_programs(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
+def read_compared(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, ...]]:
     """Read a submission's Python files, and list those that cannot be compared; a bad submission raises nothing."""
     try:
         with tempfile.TemporaryDirectory() as nothing:  # nothing is written
@@ -45,11 +45,11 @@ def read_programs(path: Path) -> tuple[tuple[ComparedProgram, ...], tuple[str, .
         return (), ("it cannot be read",)
 
 
-def read_given(folders: Iterable[Path]) -> tuple[ComparedProgram, ...]:
+def read_templates(folders: Iterable[Path]) -> tuple[ComparedProgram, ...]:
     """Read the Python files that were handed out; raises ClassError for a folder without any."""
     given: list[ComparedProgram] = []
     for folder in folders:
-        programs, _ = read_programs(folder)
+        programs, _ = read_compared(folder)
         if not programs:
             raise ClassError(f"{folder}: expected a folder with the Python files that students were given, found none")
         given += programs
@@ -67,11 +67,11 @@ def programs_of(collected: Collected) -> tuple[tuple[ComparedProgram, ...], tupl
             passed_over.append(f"{name}: {why}")
             continue
         left -= len(content)
-        programs.append(ComparedProgram(name, text_of(content), hashlib.sha256(content).hexdigest()))
+        programs.append(ComparedProgram(name, decoded_text(content), hashlib.sha256(content).hexdigest()))
     return tuple(programs), tuple(passed_over)
 
 
-def text_of(content: bytes) -> str:
+def decoded_text(content: bytes) -> str:
     """Decode a Python file in its declared encoding, if that takes linear time; invalid bytes become U+FFFD."""
     encoding = encoding_of(content)
     text = content.decode(encoding if encoding in USUAL | UNUSUAL else "utf-8", "replace")

@@ -91,7 +91,7 @@ def _cells(handed: Handed, file: str, share: float) -> tuple[str, str, str, str]
     return csv_cell(handed.name), csv_cell(handed.label), csv_cell(file), f"{share:.2f}"
 
 
-def lines_of(side: Side) -> Sequence[ShownLine]:
+def marked_lines(side: Side) -> Sequence[ShownLine]:
     """Return the lines of a file with the similar ones marked; of a long file, only the lines near those."""
     texts = side.program.text.expandtabs(4).rstrip("\n").split("\n")
     alike = frozenset(side.alike)
@@ -118,7 +118,7 @@ def _template(name: str) -> Template:
     templates.filters |= {"percent": _percent}
     templates.globals |= {
         "style": Markup(bundle().style),  # noqa: S704  part of this package
-        "lines_of": lines_of,
+        "lines_of": marked_lines,
         "report_of": report_of,
     }
     return templates.get_template(name)

@@ -13,7 +13,7 @@ from grader.grading.rubrics.builtin import builtin_recording
 from grader.runtime.compiled import COMPILED, compiled, state_of
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 from grader.runtime.recording.bag import BagMinimum, Define, read_bag, topics_in
 from grader.runtime.shipped import PACKAGE, shipped
 from grader.runtime.stimuli import RecordedStream, Recording
@@ -46,7 +46,7 @@ def recordings_of(
     return {stream: _recording(stream, given, define) for stream in dict.fromkeys(streams)}
 
 
-def observed(given: Iterable[tuple[str, Path]], start_ns: int, duration_ns: int) -> tuple[RecordedStream, ...]:
+def played_bags(given: Iterable[tuple[str, Path]], start_ns: int, duration_ns: int) -> tuple[RecordedStream, ...]:
     """Return stimuli that play recordings without a rubric; raises RecordingError for an unclear topic or type."""
     return tuple(RecordedStream(*_topic_in(name, path), str(path), start_ns, duration_ns) for name, path in given)
 
@@ -63,8 +63,10 @@ def _topic_in(name: str, path: Path) -> tuple[str, str]:
         if len(named) == 1:
             return named[0], name
     known = listed(sorted(f"{topic} ({type_})" for topic, type_ in topics.items()), "and") if topics else "no topics"
-    where = f"--recording {shown(name)}={shown(str(path), 500)}"
-    raise RecordingError(f"{where}: expected one topic to play, found {shown(known, 500)}", "name one of its topics")
+    where = f"--recording {printable(name)}={printable(str(path), 500)}"
+    raise RecordingError(
+        f"{where}: expected one topic to play, found {printable(known, 500)}", "name one of its topics"
+    )
 
 
 def _recording(stream: RecordedStream, given: Sequence[tuple[str, Path]], define: Define) -> Recording:
@@ -87,7 +89,7 @@ def refuse_unplayed(given: Iterable[tuple[str, Path]], exercises: Sequence[Exerc
     played = {stream.topic for exercise in exercises for stream in recordings_in(exercise)}
     for topic, path in given:
         if topic.startswith("/") and topic not in played:
-            where = f"--recording {shown(topic)}={shown(str(path), 500)}"
+            where = f"--recording {printable(topic)}={printable(str(path), 500)}"
             found = f"recordings are played on {listed(sorted(played))}" if played else "no rubric plays a recording"
             raise RecordingError(f"{where}: expected a topic on which a rubric plays a recording, but {found}")
 

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.grading.app.grade import Progress
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.grading.model import entry_points
 from grader.grading.model.report import Summary
 from grader.grading.reporting.formats import EVIDENCE, FORMATS, format_of
-from grader.grading.submissions.foreign_archives import install_command, is_installed
+from grader.grading.submissions.foreign_archives import has_libarchive, libarchive_commands
 from grader.runtime import machine
-from grader.runtime.interface_packages import described
+from grader.runtime.interface_packages import course_packages
 from grader.runtime.model.checkup import NO_SANDBOX, Checkup, Exchange, Fact, TierReport
 from grader.runtime.model.errors import EnvironmentFault, GraderError
 from grader.runtime.model.limits import Limits
@@ -57,7 +57,7 @@ def examine(progress: Progress, find: Callable[[], machine.Found] = machine.ros_
 
 
 def concluded(
-    facts: tuple[Fact, ...], tiers: tuple[TierReport, ...], progress: Progress, look: Look = observe
+    facts: tuple[Fact, ...], tiers: tuple[TierReport, ...], progress: Progress, look: Look = observe_programs
 ) -> Checkup:
     """Choose the tier that grading would use, and exchange messages in it.
 
@@ -77,15 +77,15 @@ def concluded(
 
 def _archives() -> Fact:
     """Report which archives students may hand in."""
-    if is_installed():
+    if has_libarchive():
         return Fact("archives", "zip and tar, .rar and .7z by libarchive")
-    return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=install_command())
+    return Fact("archives", "zip and tar; .rar and .7z need libarchive", remedy=libarchive_commands())
 
 
 def _interfaces(distro: str) -> tuple[Fact, ...]:
     """Report whether interface packages can be built, and which ones are ready."""
     try:
-        ready = [package.name for package in described(()) if package.folder]
+        ready = [package.name for package in course_packages(()) if package.folder]
     except (GraderError, ImportError) as error:
         text = error.message if isinstance(error, GraderError) else str(error)
         hint = f"install the generators: pip install ros-{distro}-rosidl-generator-py ros-{distro}-rosidl-parser"
@@ -120,7 +120,7 @@ def _added_scheduler(name: str, package: str) -> Fact:
         text = f"{name} of {package} is not used: the grader has its own"
         return Fact("class scheduler", text, remedy=f"give the scheduler of {package.partition(' ')[0]} another name")
     try:
-        entry_points.load(entry_points.SCHEDULERS, name, object, "a scheduler")
+        entry_points.load_registered(entry_points.SCHEDULERS, name, object, "a scheduler")
     except EnvironmentFault as fault:
         return Fact("class scheduler", fault.message, remedy=fault.hint)
     return Fact("class scheduler", f"{name} of {package}")

@@ -29,7 +29,7 @@ from grader.runtime.stimuli import time_phrase
 OFFERED = 3
 
 
-def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
+def explain_name(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
     """Explain a criterion id, `exercise/criterion`, or the name of a check; raises GraderError if there is none.
 
     Criteria are searched in the given rubrics, or in the built-in ones if none are given.
@@ -41,7 +41,7 @@ def explain(name: str, rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanat
     checks = {**known_checks(), **{check_name(c): type(c.check) for _, c in pairs}}
     if name in checks:
         return [_check(name, checks[name], [f"{e.id}/{c.id}" for e, c in pairs if check_name(c) == name])]
-    raise unknown(name, [*(c.id for _, c in pairs), *checks])
+    raise unknown_name(name, [*(c.id for _, c in pairs), *checks])
 
 
 def everything(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation | CheckExplanation]:
@@ -64,13 +64,13 @@ def explain_checks(rubrics: tuple[Path, ...] = ()) -> list[CriterionExplanation 
     return [_check(name, kind, used.get(name, [])) for name, kind in {**known_checks(), **own}.items()]
 
 
-def exercises_of(rubrics: tuple[Path, ...]) -> list[Exercise]:
+def given_exercises(rubrics: tuple[Path, ...]) -> list[Exercise]:
     """Return the exercises of the given rubrics, or the built-in ones; each variant has its first values."""
     return read_exercises(GradeRequest("", every=True, rubrics=rubrics, draw=First()), recorded=True)
 
 
 def _pairs(rubrics: tuple[Path, ...]) -> list[tuple[Exercise, Criterion]]:
-    return [(e, c) for e in exercises_of(rubrics) for c in e.criteria]
+    return [(e, c) for e in given_exercises(rubrics) for c in e.criteria]
 
 
 def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation:
@@ -173,7 +173,7 @@ def _connection(connection: Connection) -> str:
     return f"messages on {connection.topic}: {', '.join(filter(None, (late, lost)))}"
 
 
-def unknown(
+def unknown_name(
     name: str, names: Sequence[str], wrong: str = "expected the id of a criterion or the name of a check, found neither"
 ) -> GraderError:
     """Return the error about a name that nothing has, with the names that are near."""

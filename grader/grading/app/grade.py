@@ -31,7 +31,7 @@ from grader.runtime.model.errors import EvidenceError, SubmissionError
 from grader.runtime.model.releases import TRIED
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Trace
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 from grader.runtime.plan import Surroundings, derive, known_programs, plan_scenario
 from grader.runtime.session import (
     AUTO,
@@ -98,7 +98,7 @@ def grade_in(  # noqa: PLR0913  what to grade, and where progress goes
     `time.perf_counter`; now if it is None.
     """
     started = time.perf_counter() if started is None else started
-    with prepared(session, request, progress, started) as plans:
+    with prepared_run(session, request, progress, started) as plans:
         ready, run = plans.ready, plans.run
         exercises, submission = ready.exercises, ready.submission
         asked = {*plans.jobs, *plans.tests}
@@ -228,7 +228,7 @@ class Prepared:
 
 
 @contextmanager
-def prepared(
+def prepared_run(
     session: RecordingSession, request: GradeRequest, progress: Progress, started: float
 ) -> Iterator[Prepared]:
     """Read and stage a submission for the block, and plan its recordings; raises as `grade_in`."""
@@ -362,7 +362,7 @@ def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[E
     """Return the exercises that a submission has a file for, and the submission limited to their files."""
     begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
     if not begun:
-        where = shown(submission.path, 500)
+        where = printable(submission.path, 500)
         files = listed(wanted_files(exercises))
         raise SubmissionError(f"{where}: expected a file of an exercise, found none", f"the files are {files}")
     return begun, replace(submission, files={name: submission.files[name] for name in wanted_files(begun)})

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from grader.grading.app.explain import exercises_of, unknown
+from grader.grading.app.explain import given_exercises, unknown_name
 from grader.grading.app.rejudge import again, judgement
 from grader.grading.evidence.store import open_evidence
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.diagnosis import rules_of
-from grader.grading.judging.diagnosis.rules import Clue, Rule, in_order
+from grader.grading.judging.diagnosis.rules import Clue, Rule, rules_in_order
 from grader.grading.judging.judge_run import tried_rules
 from grader.grading.judging.run_check import check_name
 from grader.grading.model.report import RuleExplanation, RuleTrial
@@ -28,8 +28,8 @@ def explain_rules(rubrics: tuple[Path, ...] = (), name: str = "") -> list[RuleEx
     Raises:
         GraderError: There is no rule and no check of that name.
     """
-    exercises = exercises_of(rubrics)
-    rules = in_order({rule: None for exercise in exercises for rule in rules_of(exercise)})
+    exercises = given_exercises(rubrics)
+    rules = rules_in_order({rule: None for exercise in exercises for rule in rules_of(exercise)})
     names = {kind: known for known, kind in reversed(CHECKS.items())}
     found = [_rule(rule, names) for rule in rules]
     if not name:
@@ -37,7 +37,7 @@ def explain_rules(rubrics: tuple[Path, ...] = (), name: str = "") -> list[RuleEx
     checks = {*CHECKS, *(check_name(c) for e in exercises for c in e.criteria)}
     wanted = [r for r in found if r.name == name]
     if not wanted and name not in checks:
-        raise unknown(
+        raise unknown_name(
             name, [*(r.name for r in found), *checks], "expected the name of a hint rule or of a check, found neither"
         )
     return wanted or [r for r in found if not r.checks or name in r.checks]

@@ -18,7 +18,7 @@ from grader.grading.rubrics.yaml_tree import YamlSyntaxError, read_yaml
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, RubricError
 from grader.runtime.model.scenario import Stimulus, is_launch_file
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 from grader.runtime.simulation import SIMULATIONS
 
 #: Time before the first message, in seconds, to observe how the nodes wait.
@@ -40,7 +40,7 @@ class NamedSimulation:
     @property
     def option(self) -> str:
         """The option that names it, for messages."""
-        return f"--simulation {shown(self.name if self.file is None else f'{self.file}:{self.name}')}"
+        return f"--simulation {printable(self.name if self.file is None else f'{self.file}:{self.name}')}"
 
 
 def read_sent(sent: Sequence[str]) -> SentMessages:
@@ -50,7 +50,7 @@ def read_sent(sent: Sequence[str]) -> SentMessages:
         topic, _, fields = text.partition("=")
         data = _mapping(fields)
         if not topic.startswith("/") or data is None:
-            raise GraderError(f"--send {shown(text)}: expected TOPIC={{field: value}}, found something else")
+            raise GraderError(f"--send {printable(text)}: expected TOPIC={{field: value}}, found something else")
         given.setdefault(topic, []).append(data)
     return given
 
@@ -65,10 +65,10 @@ def read_launch_arguments(texts: Sequence[str], programs: Sequence[Path]) -> tup
     for text in texts:
         name, written, value = text.partition(":=")
         if not (name and written):
-            raise GraderError(f"--launch-argument {shown(text)}: expected NAME:=VALUE, found something else")
+            raise GraderError(f"--launch-argument {printable(text)}: expected NAME:=VALUE, found something else")
         if name in given:
             raise GraderError(
-                f"--launch-argument {shown(text)}: expected each argument once, found {shown(name)} again"
+                f"--launch-argument {printable(text)}: expected each argument once, found {printable(name)} again"
             )
         given[name] = value
     if given and not any(is_launch_file(program.name) for program in programs):
@@ -92,9 +92,11 @@ def _read_simulation(text: str) -> NamedSimulation:
     if parameters is None or (not colon and name not in SIMULATIONS):
         known = listed(list(SIMULATIONS))
         expected = f"expected FILE.py:NAME or a built-in one ({known}), perhaps with ={{parameter: value}}"
-        raise GraderError(f"--simulation {shown(text)}: {expected}, found something else")
+        raise GraderError(f"--simulation {printable(text)}: {expected}, found something else")
     if colon and not Path(file).is_file():
-        raise GraderError(f"--simulation {shown(text)}: expected a file with simulations, found no {shown(file)}")
+        raise GraderError(
+            f"--simulation {printable(text)}: expected a file with simulations, found no {printable(file)}"
+        )
     return NamedSimulation(name, Path(file) if colon else None, parameters)
 
 
@@ -133,9 +135,9 @@ def messages(
     stimuli: list[Mapping[str, Any]] = []
     for topic, values in sent.items():
         if topic not in types:
-            known = listed([shown(one) for one in types]) if types else "they subscribe to none"
+            known = listed([printable(one) for one in types]) if types else "they subscribe to none"
             expected = f"expected a topic that the programs subscribe to ({known}), found another"
-            raise GraderError(f"--send {shown(topic)}: {expected}")
+            raise GraderError(f"--send {printable(topic)}: {expected}")
         times = {"period": f"{period_s(duration_s, len(values)):g} s", "start": f"{min(FIRST_S, duration_s / 2):g} s"}
         stimuli.append({"messages": {"topic": topic, "type": types[topic], "values": list(values), **times}})
     return _read([], stimuli, duration_s, course, "--send")
@@ -156,7 +158,7 @@ def _read(
     with tempfile.TemporaryDirectory(prefix="grade-inputs-") as folder:
         files = {one.file.name: one.file for one in simulations if one.file is not None}
         for name, file in files.items():
-            copied(file, Path(folder) / name)
+            copied_simulation(file, Path(folder) / name)
         named = [{"simulation": {one.name: dict(one.parameters)}} for one in simulations]
         about = {"id": "observed", "processes": ["node.py"], "observe": {"duration": f"{duration_s:g} s"}}
         rubric = {
@@ -179,14 +181,14 @@ def _read(
         except RubricError as error:
             first = error.message.splitlines()[0]
             for name, file in files.items():
-                first = first.replace(str(Path(folder) / name), shown(str(file)))
+                first = first.replace(str(Path(folder) / name), printable(str(file)))
             raise GraderError(first, error.hint) from None
 
 
-def copied(file: Path, copy: Path) -> None:
+def copied_simulation(file: Path, copy: Path) -> None:
     """Copy the file of a simulation, and make the folder for it; raises GraderError if it cannot be read."""
     copy.parent.mkdir(parents=True, exist_ok=True)
     try:
         copy.write_bytes(file.read_bytes())
     except OSError as error:
-        raise GraderError(f"--simulation {shown(str(file))}: cannot be read: {error.strerror or error}") from None
+        raise GraderError(f"--simulation {printable(str(file))}: cannot be read: {error.strerror or error}") from None

@@ -39,7 +39,7 @@ def known_interfaces(course: tuple[Path, ...] = ()) -> Interfaces | None:
     return Interfaces(places.installed, places.shipped, looked_in).including(course)
 
 
-def modules_for(exercise: Exercise, course: tuple[Path, ...] = ()) -> tuple[Path, ...]:
+def rubric_modules(exercise: Exercise, course: tuple[Path, ...] = ()) -> tuple[Path, ...]:
     """Return where the modules of a rubric's own interface packages are; empty if it brings none."""
     found = built_from(rubric_folders([exercise]), course) if exercise.interfaces else None
     return (found.python,) if found is not None else ()

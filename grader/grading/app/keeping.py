@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.grading.app.request import GradeRequest, request_to_json
-from grader.grading.evidence.store import check_place, keep
+from grader.grading.evidence.store import check_place, keep_run
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import Report
 from grader.grading.model.run import Run
@@ -41,4 +41,4 @@ class EvidenceWriter:
         for folder in self._folders:
             ids = exercise_ids(self._request.exercises, exercises)
             asked = request_to_json(replace(self._request, exercises=ids), exercises)
-            keep(folder, run, exercises, request=asked, report=dumps(report).encode())
+            keep_run(folder, run, exercises, request=asked, report=dumps(report).encode())

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 
-from grader.grading.app.bags import observed, recordings_of
+from grader.grading.app.bags import played_bags, recordings_of
 from grader.grading.app.grade import Progress
 from grader.grading.app.inputs import NamedSimulation, SentMessages, messages, simulated
 from grader.grading.app.interfaces import types_in
@@ -59,7 +59,7 @@ class Watched:
     sources: Mapping[str, str] = field(default_factory=dict)  # the text of their files, and of those that faults name
 
 
-def observe(request: ObserveRequest, progress: Progress) -> Summary:
+def observe_programs(request: ObserveRequest, progress: Progress) -> Summary:
     """Run the programs together and summarise what they did; twice if messages are sent, to learn their types first.
 
     Raises:
@@ -138,7 +138,7 @@ def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
 
 def undisturbed(request: ObserveRequest, names: Sequence[str]) -> Scenario:
     """Return the scenario of programs with the simulations and the recording of a request, and no messages."""
-    played = observed(request.bags, RECORDED_AFTER_NS, max(NS_PER_S, request.duration_ns - RECORDED_AFTER_NS))
+    played = played_bags(request.bags, RECORDED_AFTER_NS, max(NS_PER_S, request.duration_ns - RECORDED_AFTER_NS))
     stimuli = (*simulated(request.simulations, request.interfaces), *played)
     launched = sum(map(is_launch_file, names)) * MOST_LAUNCHED
     limits = Limits(participants=Limits().participants + len(names) + launched)

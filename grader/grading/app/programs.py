@@ -23,8 +23,8 @@ from grader.runtime.programs.executables import (
     find_executables,
     ignored_packages,
     is_package,
-    name_of,
     needed_packages,
+    package_name,
     package_of,
     project_folders,
     words_of,
@@ -249,7 +249,7 @@ def _ignored(targets: Sequence[Target], package: Path, workspace: Path) -> Itera
             workspace = next((up for up in package.parents if up.name == "src"), package.parent)
     else:
         wanted = {target.name.split("/")[0] for target in targets if target.file is None}
-        packages = [folder for folder in project_folders(workspace) if name_of(folder) in wanted] if wanted else []
+        packages = [folder for folder in project_folders(workspace) if package_name(folder) in wanted] if wanted else []
     ignored = ignored_packages(workspace) if packages else {}
     named = {word for one in packages for word in words_of(one)} if ignored else set()
     around = {folder for one in packages for folder in (one, *one.parents)}
@@ -274,7 +274,7 @@ def _stage_needed(targets: Sequence[Target], package: Path, workspace: Path, int
         return None
     if submission is None:
         return None
-    taken = ", ".join(name_of(folder) for folder in packages)
+    taken = ", ".join(package_name(folder) for folder in packages)
     return replace(submission, notes=(f"the workspace is too large to be copied: taken are the packages {taken}",))
 
 

@@ -1,8 +1,7 @@
 """The program that records submissions once, in the conditions that it was started in, for `grade verify`.
 
 Usage: python -m grader.grading.app.recorded_again, with a `Recordings` as JSON on standard input. Writes a line of
-JSON for the
-sandbox, for each trace, and for each submission that was recorded or could not be.
+JSON for the sandbox, for each trace, and for each submission that was recorded or could not be.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from grader.grading.app.grade import prepared
+from grader.grading.app.grade import prepared_run
 from grader.grading.app.request import request_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
@@ -47,9 +46,8 @@ class Recordings:
 
     wanted: tuple[WantedRecording, ...]
     isolation: str
-    processors: tuple[int, ...] = ()  # the processors to run on; empty for all
-    reverses: bool = False  # whether to record one scenario at a time, the last one first
-    executes: bool = False  # whether to execute each student's process
+    # Whether to record on one processor, one scenario at a time with the last one first, and to execute each process
+    changed: bool = False
 
 
 def main() -> None:
@@ -58,8 +56,8 @@ def main() -> None:
     lines = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what others print is not a line of JSON
     recordings: Recordings = from_json(Recordings, json.load(sys.stdin))
-    if recordings.processors:
-        os.sched_setaffinity(0, recordings.processors)
+    if recordings.changed:
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     lock = threading.Lock()
 
     def tell(line: Mapping[str, Any]) -> None:
@@ -75,13 +73,13 @@ def main() -> None:
 
 
 def _lines(recordings: Recordings) -> Iterator[Mapping[str, Any]]:
-    workers = 1 if recordings.reverses else None
+    workers = 1 if recordings.changed else None
     numbers = range(len(recordings.wanted))
-    order = numbers[::-1] if recordings.reverses else numbers
+    order = numbers[::-1] if recordings.changed else numbers
     # Workers end with the thread that started them: this one outlives the session.
-    with open_session(recordings.isolation, workers, executes=recordings.executes) as session:
-        yield {"isolation": session.isolation.name, "can_fork": session.isolation.can_fork}
-        with ThreadPoolExecutor(1 if recordings.reverses else len(os.sched_getaffinity(0))) as pool:
+    with open_session(recordings.isolation, workers, executes=recordings.changed) as session:
+        yield {"isolation": session.isolation.name}
+        with ThreadPoolExecutor(1 if recordings.changed else len(os.sched_getaffinity(0))) as pool:
             yielded = pool.map(lambda number: _recorded(session, recordings, number), order)
             for lines in yielded:
                 yield from lines
@@ -94,9 +92,9 @@ def _recorded(session: RecordingSession, recordings: Recordings, number: int) ->
         json.loads(wanted.request), submission=wanted.path, seed=wanted.seed, rubrics=tuple(map(Path, wanted.rubrics))
     )
     try:
-        with prepared(session, request, lambda _: None, time.perf_counter()) as ready:
+        with prepared_run(session, request, lambda _: None, time.perf_counter()) as ready:
             keys = [key for key in ready.jobs if not wanted.scenarios or key in wanted.scenarios]
-            jobs = {key: ready.jobs[key] for key in (reversed(keys) if recordings.reverses else keys)}
+            jobs = {key: ready.jobs[key] for key in (reversed(keys) if recordings.changed else keys)}
             traces = session.record(jobs, AUTO, lambda _: None, on_wall=False)
             tests = {key: job for key, job in ready.tests.items() if not wanted.scenarios or key in wanted.scenarios}
             traces |= session.record_tests(tests, lambda _: None)

@@ -27,7 +27,7 @@ from grader.grading.evidence.store import (
 )
 from grader.grading.judging.judge_run import judge_run
 from grader.grading.model.exercise import Exercise, recordings_in
-from grader.grading.model.report import Report, Reproduction, exit_code
+from grader.grading.model.report import Report, Reproduction, report_exit_code
 from grader.grading.model.run import Run
 from grader.grading.reporting.audience import ANYBODY, Readers, told
 from grader.grading.reporting.delivery import Output, write_report
@@ -77,7 +77,7 @@ def judgement(
     return Judgement(tuple(exercises), ids, rubrics, pictures, verify)
 
 
-def rejudge(evidence: Evidence, how: Judgement) -> Report:
+def rejudge_evidence(evidence: Evidence, how: Judgement) -> Report:
     """Judge one submission's evidence; raises EvidenceError if it is damaged or has none of the requested exercises."""
     exercises, run = again(evidence, how)
     return judge_run(exercises, run, pictures=how.pictures)
@@ -199,7 +199,7 @@ def _result_there(named: tuple[str, Path]) -> RejudgedResult:
 def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> RejudgedResult:
     try:
         evidence = open_evidence(folder)
-        report = rejudge(evidence, how)
+        report = rejudge_evidence(evidence, how)
         _write(name, report, wanted)
     except GraderError as error:
         return RejudgedResult(name, problem=error.message, code=UNUSABLE)
@@ -210,7 +210,7 @@ def _result(name: str, folder: Path, how: Judgement, wanted: Wanted) -> Rejudged
         name,
         score=float(seen.score),
         max_score=float(seen.max_score),
-        code=exit_code(seen, wanted.min_score),
+        code=report_exit_code(seen, wanted.min_score),
         change=what_changed(name, evidence, report) if wanted.changes else None,
         report=dumps(seen) if wanted.reports else "",
     )

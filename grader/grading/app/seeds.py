@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from grader.grading.model.exercise import Drawn, Exercise, Value
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import KeyFileError, VariantError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 if TYPE_CHECKING:
     from grader.grading.rubrics.draws import Options
@@ -41,7 +41,7 @@ _VARIANT_BYTES = 16
 
 def read_key(path: Path, what: str) -> bytes:
     """Read a key from a file, and strip whitespace; a KeyFileError calls it `what`, such as `course key`."""
-    where = shown(str(path), 500)
+    where = printable(str(path), 500)
     try:
         with path.open("rb") as file:
             key = file.read(MOST_BYTES + 1).strip()
@@ -141,19 +141,19 @@ def folded(student: str) -> str:
 
 def by_key(path: Path, student: str) -> ByKey:
     """Read the course key for a student; raises GraderError if the key or the id cannot be used."""
-    return ByKey(read_key(path, "course key"), checked(student))
+    return ByKey(read_key(path, "course key"), checked_student(student))
 
 
-def checked(student: str) -> str:
+def checked_student(student: str) -> str:
     """Strip whitespace from the id of a student; raises VariantError if the id cannot be used."""
     plain = student.strip()
     if not folded(plain) or len(plain) > MOST_ID or not plain.isprintable():
-        text = f"expected the id of a student, up to {MOST_ID} characters on one line, found `{shown(student)}`"
+        text = f"expected the id of a student, up to {MOST_ID} characters on one line, found `{printable(student)}`"
         raise VariantError(f"--student: {text}")
     return plain
 
 
-def drawn(exercises: list[Exercise], student: str) -> Drawn | None:
+def drawn_values(exercises: list[Exercise], student: str) -> Drawn | None:
     """Return the variant values of the exercises; None if they have no variants."""
     values = {e.id: dict(e.variant.values) for e in exercises if e.variant is not None}
     return Drawn(student, values) if values else None

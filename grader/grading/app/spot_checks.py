@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from grader.grading.judging.agreement import ClockDifference, differences, sentence, start_of
+from grader.grading.judging.agreement import ClockDifference, differences, observation_start, sentence
 from grader.grading.judging.idle_machine import quicker
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
@@ -62,7 +62,7 @@ def bare_plan(plan: Plan, virtual: Trace) -> Plan:
     )
 
 
-def is_drawn(share: float, seed: int, digest: str) -> bool:
+def is_spot_checked(share: float, seed: int, digest: str) -> bool:
     """Whether a submission is drawn. Depends only on seed and digest, so only the owner of the key can predict it."""
     return int(derive(seed, "spot check", digest)[:12], 16) < share * 16**12
 
@@ -79,7 +79,7 @@ class SpotChecks:
     @property
     def drawn(self) -> bool:
         """Whether this submission is drawn for a spot check."""
-        return is_drawn(self.share, self.seed, self.digest)
+        return is_spot_checked(self.share, self.seed, self.digest)
 
     @property
     def certain(self) -> bool:
@@ -116,7 +116,7 @@ class SpotChecks:
         return found
 
     def _draws(self, share: float, what: str) -> bool:
-        return is_drawn(share, self.seed, f"{self.digest} {what}")
+        return is_spot_checked(share, self.seed, f"{self.digest} {what}")
 
     def suspects(self, key: Key, traces: Mapping[Key, Trace]) -> bool:
         """Whether the exercise must pass its check, because a program accesses internals of its process."""
@@ -198,7 +198,7 @@ class _Checked:
         What no busy machine can cause comes first, and counts however busy it was.
         """
         first_message_on = self.job.plan.first_message_on
-        starts_ns = start_of(self.recorded, first_message_on), start_of(wall, first_message_on)
+        starts_ns = observation_start(self.recorded, first_message_on), observation_start(wall, first_message_on)
         judged = self.judge.compare(self.recorded, wall, starts_ns)
         other = differences(self.recorded, wall, first_message_on)
         if certain := next((difference for difference in other if not difference.by_load), None):

@@ -28,7 +28,7 @@ _FILES = re.compile(r"^files: \[(.+)\]$", re.MULTILINE)
 _MOST_FOLDERS = 200
 
 
-def grade(  # noqa: PLR0913  what to grade, and where progress goes
+def grade_once(  # noqa: PLR0913  what to grade, and where progress goes
     request: GradeRequest,
     progress: Progress,
     on_recorded: Callable[[Run, Sequence[Exercise]], None] | None = None,

@@ -1,4 +1,4 @@
-"""Records submissions several times under conditions that must not matter, and compares them, for `grade verify`."""
+"""Records submissions again, with everything changed, and under load, and compares, for `grade verify`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import IO, Any
 
-from grader.grading.app.conditions import FIRST, OTHER_FOLDER, VerifyCondition, conditions, own_home, surroundings
 from grader.grading.app.grade import Progress, begun, read_exercises, wanted_files
 from grader.grading.app.recorded_again import Recordings, WantedRecording
 from grader.grading.app.request import GradeRequest, request_of, request_to_json
@@ -28,14 +27,22 @@ from grader.grading.submissions.submission import collect_submission, stage_coll
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, HarnessError
 from grader.runtime.model.trace import ClockKind, Trace
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.recording.codec import to_json
 from grader.runtime.recording.packed import trace_from_json
 
 #: Exercise and scenario.
 Key = tuple[str, str]
-#: The condition of recordings that were kept as evidence.
-KEPT = "kept"
+#: The conditions: nothing is changed, all that must not matter is, and the machine is busy; and kept evidence.
+AGAIN, TOGETHER, LOAD, KEPT = "again", "together", "load", "kept"
+#: A time zone with an odd offset, and a language of another encoding.
+ELSEWHERE: Mapping[str, str] = {"TZ": "Asia/Kathmandu", "LANG": "de_DE.ISO-8859-1", "LC_ALL": "C"}
+#: The hash seeds of the grader's own processes: the usual one, and another one.
+HASH_SEEDS = ("1", "2")
+#: The name of the temporary folder when everything is changed.
+OTHER_FOLDER = "another temporary folder"
+#: Busy loops for each processor under load: a node then gets a third of one.
+LOOPS = 2
 #: The program that records under a condition.
 PROGRAM = (sys.executable, "-m", "grader.grading.app.recorded_again")
 #: A loop that keeps a processor busy as long as the process lives that started it, whose pid is its argument.
@@ -47,12 +54,37 @@ _MOST_CHARACTERS = 300
 
 
 @dataclass(frozen=True, slots=True)
+class VerifyCondition:
+    """One condition, and how it is made."""
+
+    name: str
+    words: str  # what is different under it, as a phrase
+    changed: bool = False  # whether all that must not matter is another: order, processors, place, hashes, start
+    loops: int = 0  # busy loops beside it
+
+
+#: The first recording, which the others are compared with.
+FIRST = VerifyCondition("first", "as grading records")
+
+
+def verify_conditions() -> tuple[VerifyCondition, ...]:
+    """Return what is recorded after the first recording, in this order."""
+    loops = LOOPS * len(os.sched_getaffinity(0))
+    return (
+        VerifyCondition(AGAIN, "again, with nothing changed"),
+        VerifyCondition(
+            TOGETHER, "in another order, on one processor, elsewhere, with other hashes, each executed", changed=True
+        ),
+        VerifyCondition(LOAD, f"beside {loops} busy loops", loops=loops),
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class VerifyRequest:
     """What to verify, and how."""
 
     submissions: tuple[str, ...]  # paths as the user typed them
     how: GradeRequest  # how to grade each; its submission, workers and recordings are not read
-    conditions: tuple[str, ...] = ()  # names of conditions; empty for all usual ones
     evidence: Path | None = None  # kept evidence of the one submission, to compare with as well
     program: Sequence[str] = PROGRAM  # the command that records; see `grader.grading.app.recorded_again`
 
@@ -102,7 +134,7 @@ def verify(request: VerifyRequest, progress: Progress) -> Verification:
     """
     with tempfile.TemporaryDirectory(prefix="grade-verify-") as name:
         folder = Path(name)
-        folder.chmod(0o755)  # another user reads the staged submissions
+        folder.chmod(0o755)  # a sandbox's user reads the staged submissions
         progress("reading the submissions")
         evidence = None if request.evidence is None else open_evidence(request.evidence)
         subjects = [_subject(request, path, folder / str(n), evidence) for n, path in enumerate(request.submissions)]
@@ -111,8 +143,7 @@ def verify(request: VerifyRequest, progress: Progress) -> Verification:
         isolation = _record_first(folder, subjects, isolation, request.program)
         first = [(Place(one.name, *key), each) for one in subjects for key, each in one.first.items()]
         tried = [] if evidence is None else [_compared_with_evidence(subjects)]
-        progress("looking for conditions to record under")
-        wanted = conditions(request.conditions, isolation, surroundings())
+        wanted = verify_conditions()
         for number, condition in enumerate(wanted, 1):
             progress(f"recording {condition.words} ({number} of {len(wanted)})")
             tried.append(_tried(folder, subjects, condition, isolation, request.program))
@@ -146,8 +177,8 @@ def _subject(request: VerifyRequest, path: str, into: Path, evidence: Evidence |
     if every:
         exercises, submission = begun(exercises, submission)
     if evidence is not None and evidence.manifest.submission.digest != submission.digest:
-        where = shown(str(evidence.folder), 500)
-        text = f"{where}: expected evidence of {shown(path, 500)}, found that of other files"
+        where = printable(str(evidence.folder), 500)
+        text = f"{where}: expected evidence of {printable(path, 500)}, found that of other files"
         raise EvidenceError(text, "name the submission as it was graded, or other evidence")
     seed = how.seed_key.seed(submission.digest) if how.seed is None else how.seed
     asked = replace(
@@ -207,11 +238,10 @@ def _tried(
     """Record under a condition and compare with the first recordings."""
     counted = _Counted(condition.name, condition.words)
     comparable = [one for one in subjects if one.comparable]
-    if condition.not_tried or not comparable:
-        why = condition.not_tried or "there is nothing to compare"
-        return Tried(condition.name, condition.words, ConditionState.NOT_TRIED, why)
+    if not comparable:
+        return counted.tried()
     again = [replace(one, wanted=replace(one.wanted, scenarios=one.comparable)) for one in comparable]
-    for line in _recorded(folder, again, condition, condition.isolation or isolation, program):
+    for line in _recorded(folder, again, condition, isolation, program):
         if "problem" in line:
             counted.problem = counted.problem or str(line["problem"])
         elif "trace" in line:
@@ -279,23 +309,19 @@ def _recorded(
     recordings = Recordings(
         wanted=tuple(one.wanted for one in subjects),
         isolation=isolation,
-        processors=condition.processors,
-        reverses=condition.reverses,
-        executes=condition.executes,
+        changed=condition.changed,
     )
     variables = {name: value for name, value in os.environ.items() if name != VARIABLE}
-    variables |= {**FIRST.variables, **condition.variables}
+    variables["PYTHONHASHSEED"] = HASH_SEEDS[condition.changed]
     with ExitStack() as stack:
-        own = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="condition-", dir=folder)))
-        own.chmod(0o755)
-        if condition.other_folder:
+        if condition.changed:
+            own = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="condition-", dir=folder)))
+            own.chmod(0o755)
             (own / OTHER_FOLDER).mkdir()
-            variables["TMPDIR"] = str(own / OTHER_FOLDER)
-        if condition.user is not None:
-            variables |= own_home(condition.user, own)
+            variables |= {**ELSEWHERE, "TMPDIR": str(own / OTHER_FOLDER)}
         stack.enter_context(_busy(condition.loops))
         said = stack.enter_context(tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace"))
-        program = stack.enter_context(_started(command, condition, variables, said))
+        program = stack.enter_context(_started(command, variables, said))
         assert program.stdin is not None
         assert program.stdout is not None
         with suppress(BrokenPipeError), program.stdin as told:  # if it has ended, its exit code says so
@@ -305,18 +331,13 @@ def _recorded(
         if program.wait() != 0:
             said.seek(0)
             words = said.read().strip().splitlines()
-            last = shown(words[-1], _MOST_CHARACTERS) if words else f"exit code {program.returncode}"
+            last = printable(words[-1], _MOST_CHARACTERS) if words else f"exit code {program.returncode}"
             yield {"problem": f"recording ended early: {last}", "hint": ""}
 
 
 @contextmanager
-def _started(
-    command: Sequence[str], condition: VerifyCondition, variables: Mapping[str, str], said: IO[str]
-) -> Iterator[subprocess.Popen[str]]:
+def _started(command: Sequence[str], variables: Mapping[str, str], said: IO[str]) -> Iterator[subprocess.Popen[str]]:
     """Start the program that records, and end it with the block."""
-    as_user: dict[str, Any] = {}
-    if condition.user is not None:
-        as_user = {"user": condition.user, "group": condition.user, "extra_groups": []}
     program = subprocess.Popen(
         command,
         env=dict(variables),
@@ -325,7 +346,6 @@ def _started(
         stdout=subprocess.PIPE,
         stderr=said,
         encoding="utf-8",
-        **as_user,
     )
     try:
         yield program

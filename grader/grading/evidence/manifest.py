@@ -91,7 +91,7 @@ def remove(folder: Path, names: Iterable[str]) -> None:
                 (folder / name).parent.rmdir()
 
 
-def read(path: Path, most: int) -> bytes:
+def read_file(path: Path, most: int) -> bytes:
     """Read a regular file of at most `most` bytes without following links; raises EvidenceError for anything else."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -177,12 +177,12 @@ class Manifest(_Strict, frozen=True, omit_defaults=True):
     interfaces: KeptInterfaces = KeptInterfaces()
 
 
-def dump(manifest: Manifest) -> bytes:
+def dump_manifest(manifest: Manifest) -> bytes:
     """Convert a manifest to JSON; the same manifest gives the same bytes."""
     return json.dumps(msgspec.to_builtins(manifest), indent=1, allow_nan=False).encode() + b"\n"
 
 
-def parse(data: bytes) -> Manifest:
+def parse_manifest(data: bytes) -> Manifest:
     """Parse a manifest; raises EvidenceError if it is invalid, or has another version."""
     try:
         found = json.loads(data)

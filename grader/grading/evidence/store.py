@@ -54,7 +54,9 @@ def check_place(folder: Path) -> None:
     files.refuse_foreign(folder, (files.MANIFEST, files.REPORT), _own(folder))
 
 
-def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapping[str, Any], report: bytes) -> None:
+def keep_run(
+    folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapping[str, Any], report: bytes
+) -> None:
     """Write a run as evidence; files of an earlier run are replaced, other files are kept.
 
     The request for grading is not read by judging. Raises EvidenceError if a file cannot be written, or would replace
@@ -74,9 +76,9 @@ def keep(folder: Path, run: Run, exercises: Sequence[Exercise], *, request: Mapp
     files.refuse_foreign(folder, names, old)
     manifest = _manifest(run, exercises, recordings, request=request, names=names)
     unfinished = msgspec.structs.replace(manifest, complete=False, files=tuple(sorted({*names, *old})))
-    files.write(folder, {files.MANIFEST: kept.dump(unfinished), **written})
+    files.write(folder, {files.MANIFEST: kept.dump_manifest(unfinished), **written})
     files.remove(folder, set(old) - set(names))
-    files.write(folder, {files.MANIFEST: kept.dump(manifest)})
+    files.write(folder, {files.MANIFEST: kept.dump_manifest(manifest)})
 
 
 def carry_over(evidence: Evidence, into: Path, *, request: Mapping[str, Any], report: bytes) -> None:
@@ -94,7 +96,7 @@ def carry_over(evidence: Evidence, into: Path, *, request: Mapping[str, Any], re
         raise EvidenceError(f"{into}: the evidence cannot be written: {error.strerror or error}") from error
     run = msgspec.structs.replace(evidence.manifest.run, request=dict(request))
     manifest = msgspec.structs.replace(evidence.manifest, run=run)
-    files.write(into, {files.REPORT: report, files.MANIFEST: kept.dump(manifest)})
+    files.write(into, {files.REPORT: report, files.MANIFEST: kept.dump_manifest(manifest)})
 
 
 def add_verification(folder: Path, result: bytes) -> None:
@@ -102,7 +104,7 @@ def add_verification(folder: Path, result: bytes) -> None:
     manifest = open_evidence(folder).manifest
     files.refuse_foreign(folder, (files.VERIFICATION,), _own(folder))
     listed = msgspec.structs.replace(manifest, files=tuple(sorted({*manifest.files, files.VERIFICATION})))
-    files.write(folder, {files.MANIFEST: kept.dump(listed)})
+    files.write(folder, {files.MANIFEST: kept.dump_manifest(listed)})
     files.write(folder, {files.VERIFICATION: result})
 
 
@@ -116,9 +118,9 @@ def _link_or_copy(old: Path, new: Path) -> None:
 def open_evidence(folder: Path) -> Evidence:
     """Open the evidence in a folder; raises EvidenceError if there is none, or it has another version or is damaged."""
     path = folder / files.MANIFEST
-    data = files.read(path, MAX_MANIFEST_BYTES)
+    data = files.read_file(path, MAX_MANIFEST_BYTES)
     try:
-        manifest = kept.parse(data)
+        manifest = kept.parse_manifest(data)
     except EvidenceError as error:
         raise EvidenceError(f"{path}: {error.message}", "grade the submission again") from error
     if not manifest.complete:
@@ -166,7 +168,7 @@ def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Map
 def first_report(evidence: Evidence) -> Mapping[str, Any] | None:
     """Return the report that was made when the submission was graded; None if it is missing or invalid."""
     try:
-        report = json.loads(files.read(evidence.folder / files.REPORT, MAX_MANIFEST_BYTES))
+        report = json.loads(files.read_file(evidence.folder / files.REPORT, MAX_MANIFEST_BYTES))
     except (EvidenceError, ValueError, RecursionError):
         return None
     return report if isinstance(report, dict) else None
@@ -196,7 +198,7 @@ def _trace(
         return Trace(recording.scenario, ClockKind.VIRTUAL, 0, (), harness_problem=f"{problem}; grade again")
     name = files.recording_name(owner.id, recording.scenario)
     path = evidence.folder / name
-    data = files.read(path, MAX_RECORDING_BYTES)
+    data = files.read_file(path, MAX_RECORDING_BYTES)
     try:
         found = kept.sha256(data)
         if found != recording.digest:
@@ -225,7 +227,7 @@ def _compare(
 def _own(folder: Path) -> tuple[str, ...]:
     """Return the files in a folder that an earlier run wrote, from its manifest; none without a manifest."""
     try:
-        manifest = kept.parse(files.read(folder / files.MANIFEST, MAX_MANIFEST_BYTES))
+        manifest = kept.parse_manifest(files.read_file(folder / files.MANIFEST, MAX_MANIFEST_BYTES))
     except EvidenceError:
         return ()
     return tuple(name for name in manifest.files if files.is_own(name))

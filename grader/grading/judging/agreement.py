@@ -99,14 +99,18 @@ def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tupl
         wall: The beginning of the same plan on the wall clock, from a machine that kept up.
         first_message_on: Topic whose first message starts the observation; empty if it starts at once.
     """
-    span_ns = wall.stop_ns - start_of(wall, first_message_on)
-    windows = [_Window(t, start, start + span_ns) for t in (virtual, wall) for start in [start_of(t, first_message_on)]]
+    span_ns = wall.stop_ns - observation_start(wall, first_message_on)
+    windows = [
+        _Window(t, start, start + span_ns)
+        for t in (virtual, wall)
+        for start in [observation_start(t, first_message_on)]
+    ]
     pair = (windows[0], windows[1])
     ends = tuple(_ends(*pair))
     return (*_traffic(*pair), *_answers(*pair), *_exchanges(*pair), *_logs(*pair), *_endpoints(*pair), *ends)
 
 
-def start_of(trace: Trace, first_message_on: str) -> int:
+def observation_start(trace: Trace, first_message_on: str) -> int:
     """Return when the observation starts: with the first message on a topic, or at once if there is none."""
     messages = trace.messages(first_message_on) if first_message_on else ()
     return messages[0].t_ns if messages else 0

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from grader.grading.model.exercise import Check, Finding, Location, Problem, ProblemKind
 from grader.grading.model.wording import quote
-from grader.runtime.model.author_files import AuthorMistake, line_of, words_of
+from grader.runtime.model.author_files import AuthorMistake, error_words, line_of
 
 
 def is_authored(check: Check) -> bool:
@@ -18,7 +18,7 @@ def is_authored(check: Check) -> bool:
 def mistake_of(check: Check, error: BaseException) -> AuthorMistake:
     """Return an error in a check of an author's as a mistake, at the last line of the author's file that led to it."""
     path = _file_of(check)
-    return AuthorMistake(_base(path), line_of(error, path), f"{type(error).__name__}: {quote(words_of(error))}")
+    return AuthorMistake(_base(path), line_of(error, path), f"{type(error).__name__}: {quote(error_words(error))}")
 
 
 def mistake_in(check: Check, method: str, text: str) -> AuthorMistake:
@@ -40,7 +40,7 @@ def _base(path: str) -> str:
 _DEEPEST = 12
 
 
-def breach(finding: object) -> str:
+def finding_flaw(finding: object) -> str:
     """Describe what is wrong with a check's return value, as the end of a sentence; empty if it is a valid finding.
 
     The credit needs no look: `Finding` refuses a wrong one.

@@ -11,7 +11,7 @@ from grader.grading.judging.logs.outputs import printed_lines
 from grader.grading.judging.texts import clean
 from grader.grading.judging.values import Reading
 from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Point, Series, Stretch, Tone, VerticalLine
-from grader.grading.model.wording import listed, number, quote
+from grader.grading.model.wording import first_few, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds, within
 from grader.runtime.model.trace import LogRecord, OutputLine, Request, Response, Trace
@@ -88,7 +88,7 @@ def compared_panels(
         some = [(seconds(t_ns), got) for t_ns, got, fits in read if fits is right]
         rows += [series(name, some, look=Look.DOTS, tone=tone)] if some else []
     wrong = len(compared) - sum(fits for *_, fits in read)
-    said = f"Numbers in {where}: {listed([number(got) for _, got, _ in read], 6)}; {wrong} of {len(compared)} wrong."
+    said = f"Numbers in {where}: {first_few([number(got) for _, got, _ in read], 6)}; {wrong} of {len(compared)} wrong."
     return ((Panel(title, "", tuple(rows)), said),)
 
 

@@ -37,23 +37,6 @@ class DrawFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class AnswerRow:
-    """One input that was held for some time, and the answer to it."""
-
-    input: float
-    answer: float | None  # the last answer while it was held; None for none
-    expected: float
-
-
-@dataclass(frozen=True, slots=True)
-class AnswerFacts:
-    """The answers of a controller that are wrong."""
-
-    rows: tuple[AnswerRow, ...] = ()  # in the order of the inputs, if each one was held for some time
-    late: bool = False  # whether each answer fits an earlier input
-
-
-@dataclass(frozen=True, slots=True)
 class LogFacts:
     """What a process logs of the values that it received."""
 

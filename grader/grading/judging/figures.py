@@ -27,7 +27,7 @@ from grader.grading.model.chart import (
     Tone,
     VerticalLine,
 )
-from grader.grading.model.exercise import Criterion, Exercise, Location, has, reads_sources
+from grader.grading.model.exercise import Criterion, Exercise, Location, has_member, reads_sources
 from grader.grading.model.report import ExerciseReport
 from grader.grading.model.wording import quote
 from grader.runtime.model.author_files import AuthorMistake
@@ -64,7 +64,7 @@ def expectation(criterion: Criterion, mistakes: list[AuthorMistake]) -> str:
     """
     check: Any = criterion.check
     try:
-        own = check.expected if has(check, "expected") else ""
+        own = check.expected if has_member(check, "expected") else ""
     except Exception as error:
         if not is_authored(check):
             raise

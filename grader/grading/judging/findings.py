@@ -10,7 +10,7 @@ from fractions import Fraction
 from grader.grading.judging.facts import OtherEnd
 from grader.grading.judging.values import HIDDEN_TOPICS, student_endpoints
 from grader.grading.model.exercise import Finding, Location, Problem, ProblemKind, exact_share
-from grader.grading.model.wording import listed, moment, nearest, quote, span
+from grader.grading.model.wording import first_few, moment, nearest, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S, counted, seconds
 from grader.runtime.model.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace, UnmetPolicy
@@ -275,7 +275,7 @@ def _explain_service(trace: Trace, kind: str, service: str, type_: str | None) -
         reason = f"{client} sends no request in {observed(trace)}"
         return not_met(reason, {"service": service, "node": mine[0].node}, problem=ProblemKind.SILENT)
     seen = list(dict.fromkeys(f"{e.service} [{e.type}]" for e in ends))
-    reason = f"{service}: not in the ROS graph in {observed(trace)}{f'; seen: {listed(seen)}' if seen else ''}"
+    reason = f"{service}: not in the ROS graph in {observed(trace)}{f'; seen: {first_few(seen)}' if seen else ''}"
     return not_met(reason, {"service": service, "seen": seen[:20]}, problem=ProblemKind.ABSENT)
 
 
@@ -389,7 +389,7 @@ def _silent_publisher(trace: Trace, topic: str, type_: str | None) -> Finding | 
 def _nothing(trace: Trace, topic: str, kind: str) -> Finding:
     others = dict.fromkeys(f"{e.topic} [{e.type}]" for e in student_endpoints(trace, kind))
     reason = f"{topic}: no {kind} in {observed(trace)}"
-    reason += f"; {kind}s seen: {listed(list(others))}" if others else ""
+    reason += f"; {kind}s seen: {first_few(list(others))}" if others else ""
     evidence = {"topic": topic, "seen": list(others)[:20]}
     return not_met(reason, evidence, hint=limit_hint(trace), problem=ProblemKind.ABSENT)
 

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Mapping, Sequence
 
 from grader.grading.judging.findings import faults_before_stop
-from grader.grading.judging.source import read, words
+from grader.grading.judging.source import read_source, words
 from grader.grading.model.exercise import Location
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import is_launch_file
@@ -135,7 +135,7 @@ def may_differ_by_numpy(trace: Trace, processes: Sequence[str], sources: Mapping
 
 
 def _imports(text: str, package: str) -> bool:
-    source = read("", text)
+    source = read_source("", text)
     plain = (alias.name for node in source.all(ast.Import) for alias in node.names)
     parts = (node.module or "" for node in source.all(ast.ImportFrom) if not node.level)
     return any(name.partition(".")[0] == package for name in (*plain, *parts))

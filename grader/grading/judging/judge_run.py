@@ -14,7 +14,7 @@ from grader.grading.judging.findings import FAULT_KEY, SEND_LATER, fault_evidenc
 from grader.grading.judging.run_check import Answer, check_name, run_check
 from grader.grading.judging.simulations import unheard_by_simulations
 from grader.grading.judging.values import HIDDEN_TOPICS, on_student_topic
-from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome, named, roles_of, variant_notes
+from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome, roles_of, texts_under, variant_notes
 from grader.grading.model.report import (
     AUTHOR_MISTAKE,
     NOT_JUDGED,
@@ -25,7 +25,7 @@ from grader.grading.model.report import (
     Verdict,
 )
 from grader.grading.model.run import Run
-from grader.grading.model.wording import listed, quote
+from grader.grading.model.wording import first_few, quote
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario, is_launch_file
@@ -151,13 +151,13 @@ def _notes(
     found = (
         note
         for _, t in recorded
-        for note in (*started(t), *same_names(t), *unheard(t), *unheard_by_simulations(t), *t.notes)
+        for note in (*unusual_starts(t), *same_names(t), *notes_on_unheard(t), *unheard_by_simulations(t), *t.notes)
     )
     notes = tuple(dict.fromkeys(found))
     return notes if sources is None else placed(notes, submission, sources)
 
 
-def unheard(trace: Trace) -> tuple[str, ...]:
+def notes_on_unheard(trace: Trace) -> tuple[str, ...]:
     """Return notes on the topics whose first messages nobody would have heard outside, because they came too early."""
     early = Counter(m.topic for m in trace.messages() if m.before_discovery and m.topic not in HIDDEN_TOPICS)
     return tuple(_unheard(quote(topic), count, len(trace.messages(topic))) for topic, count in early.items())
@@ -172,7 +172,7 @@ def _unheard(topic: str, early: int, messages: int) -> str:
     )
 
 
-def started(trace: Trace) -> tuple[str, ...]:
+def unusual_starts(trace: Trace) -> tuple[str, ...]:
     """Return the files that were not started as `python3 FILE` alone, and how they were started."""
     plain = [s.way is StartWay.SCRIPT and not s.arguments and not s.launched_by for s in trace.starts]
     return tuple(f"{s.file}: run {s.words}" for s, alone in zip(trace.starts, plain, strict=True) if not alone)
@@ -335,7 +335,7 @@ class VerdictBuilder:
         """
         criteria = self.exercise.criteria
         by_id = next((c for c in criteria if c.id == name), None)
-        fitting = [c for c in criteria if name in (check_name(c), *named(c.check, *roles_of(type(c.check)).logs))]
+        fitting = [c for c in criteria if name in (check_name(c), *texts_under(c.check, *roles_of(type(c.check)).logs))]
         same = [c for c in fitting if c.scenario == criterion.scenario]
         alike = [c for c in fitting if self._processes(c) == self._processes(criterion)]
         return by_id or next(iter([*same, *alike]), None)
@@ -371,7 +371,7 @@ class VerdictBuilder:
             evidence.pop("likely", None)
         reason = f"{unnamed}: {looked_for.problem or 'not in the submission'}"
         found = () if looked_for.problem else (*similar, *others)
-        reason += f"; found {listed(found, len(found))}{' instead' if similar else ''}" if found else ""
+        reason += f"; found {first_few(found, len(found))}{' instead' if similar else ''}" if found else ""
         verdict = _without_points(criterion, Outcome.NOT_MET, reason, hint=hint, evidence=evidence)
         return replace(verdict, missing_file=unnamed)
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import islice
-from typing import Any, Protocol
+from typing import Any
 
 from grader.grading.judging.charts import (
     MOST_CASES,
@@ -31,12 +31,12 @@ from grader.grading.judging.values import (
     number_path,
     published,
     rules_text,
-    shown,
+    shown_value,
     value_at,
 )
 from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Series, Stretch, Tone
-from grader.grading.model.exercise import NODE_GRAPH, has, named, roles_of
-from grader.grading.model.wording import in_unit, listed, number, quote
+from grader.grading.model.exercise import NODE_GRAPH, has_member, roles_of, texts_under
+from grader.grading.model.wording import first_few, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, counted, seconds
@@ -135,12 +135,12 @@ def chart_of(check: Any, trace: Trace) -> Chart | None:
     if shows_graph(check):
         return None
     try:
-        found = check.drawing(trace) if has(check, "drawing") else _named(check)
+        found = check.drawing(trace) if has_member(check, "drawing") else _named(check)
     except HarnessError:  # what the check asks is not in the recording
         return None
     if not isinstance(found, (Drawing, Chart, type(None))):
         raise TypeError(f"drawing returned a {type(found).__name__}, expected a Drawing, a Chart or None")
-    return drawn(found, trace) if isinstance(found, Drawing) else found
+    return drawn_chart(found, trace) if isinstance(found, Drawing) else found
 
 
 def shows_graph(check: object) -> bool:
@@ -151,20 +151,20 @@ def shows_graph(check: object) -> bool:
 def _named(check: object) -> Drawing:
     """Return a drawing of the topics, services, actions and output that the parameters of a check name."""
     roles = roles_of(type(check))
-    plots = [Plot(topic) for topic in named(check, *roles.topics)]
-    fields = list(named(check, *roles.fields))
+    plots = [Plot(topic) for topic in texts_under(check, *roles.topics)]
+    fields = list(texts_under(check, *roles.fields))
     fields += [str(path) for name in roles.fields for path in _keys(getattr(check, name, None))]
     if plots and fields:
         plots[-1] = replace(plots[-1], fields=tuple(fields))
-    services, action = named(check, *roles.services), "".join(named(check, *roles.actions)[:1])
-    return Drawing(tuple(plots), services, action=action, processes=named(check, roles.process))
+    services, action = texts_under(check, *roles.services), "".join(texts_under(check, *roles.actions)[:1])
+    return Drawing(tuple(plots), services, action=action, processes=texts_under(check, roles.process))
 
 
 def _keys(value: object) -> Iterable[object]:
     return value if isinstance(value, Mapping) else ()
 
 
-def drawn(drawing: Drawing, trace: Trace) -> Chart | None:
+def drawn_chart(drawing: Drawing, trace: Trace) -> Chart | None:
     """Return a drawing as a chart over time; None if there is nothing but output of processes."""
     above: _Panels = []
     below: _Panels = []
@@ -205,8 +205,8 @@ def drawn(drawing: Drawing, trace: Trace) -> Chart | None:
 def _title(came: Sequence[str], went: Sequence[str], asked: Sequence[str], processes: Sequence[str]) -> str:
     parts = [f"messages received on {' and '.join(came[:2])}"] if came else []
     parts += [f"messages published on {' and '.join(went[:2])}"] if went else []
-    parts += [listed(asked)] if asked else []
-    parts += [f"output of {listed(processes)}"] if processes else []
+    parts += [first_few(asked)] if asked else []
+    parts += [f"output of {first_few(processes)}"] if processes else []
     text = f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts)
     return text[:1].upper() + text[1:]
 
@@ -276,7 +276,7 @@ def value_panels(plot: Plot, timed: Sequence[_Timed], head: str, prefix: str = "
     said += [_constants_said(fields, chosen)] if fields.constants else []
     said += [f"expected: {quote(rules_text(plot.rules), 300)}"] if plot.rules else []
     said += [_band_said(band) for band in plot.bands]
-    said += [f"not drawn: {listed([_label(p) for p in hidden])}"] if hidden else []
+    said += [f"not drawn: {first_few([_label(p) for p in hidden])}"] if hidden else []
     words = f"{head}{': ' if any(said) else ''}{'; '.join(filter(None, said))}."
     if panels:
         panels[0] = (panels[0][0], words)
@@ -431,7 +431,7 @@ def _numbers_said(path: str, readings: Sequence[Reading]) -> str:
 def _constants_said(fields: _Fields, chosen: Sequence[str]) -> str:
     rest = [f"{_label(path)} = {number(v)}" for path, v in fields.constants.items() if path not in chosen]
     how = "never changing" if fields.whole else "the same in every message of a sample"
-    return f"{how}: {listed(rest, 3)}" if rest else ""
+    return f"{how}: {first_few(rest, 3)}" if rest else ""
 
 
 def _bool_panel(path: str, timed: Sequence[_Timed], prefix: str) -> Panel:
@@ -468,7 +468,7 @@ def _text_panel(path: str, timed: Sequence[_Timed], prefix: str, rule: RuleOrVal
         )
         for (name, tone), some in kinds.items()
     )
-    said = f"{_label(path)}: {listed([repr(word) for word in words])}"
+    said = f"{_label(path)}: {first_few([repr(word) for word in words])}"
     return Panel(f"{prefix} {_label(path)}".strip(), "", rows, lanes=lanes), said
 
 
@@ -584,31 +584,4 @@ def _part(value: Mapping[str, object], name: str) -> Mapping[str, object]:
 
 def said_of(value: Mapping[str, object]) -> str:
     """Return the content of a message as text: `order = 3, name = 'a'`."""
-    return ", ".join(f"{quote(str(name), 40)} = {shown(inner)}" for name, inner in islice(value.items(), 12))
-
-
-class Switching(Protocol):
-    """A check on a controller that switches at a threshold."""
-
-    @property
-    def input(self) -> str:
-        """Topic of the numbers."""
-
-    @property
-    def output(self) -> str:
-        """Topic of the answers."""
-
-    @property
-    def threshold(self) -> float:
-        """Where the answer changes."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of the input."""
-
-
-def threshold_drawing(check: Switching, expected: Sequence[Reading]) -> Drawing:
-    """Return the inputs of a controller with its threshold, above its answers with the expected ones."""
-    level = Level(check.threshold, f"{number(check.threshold)}{in_unit(check.unit)}", name="threshold")
-    heard = Plot(check.input, levels=(level,), unit=check.unit)
-    return Drawing((heard, Plot(check.output, expected=tuple(expected))))
+    return ", ".join(f"{quote(str(name), 40)} = {shown_value(inner)}" for name, inner in islice(value.items(), 12))

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 
-from grader.grading.judging.source import Source, argument, read, text_of
+from grader.grading.judging.source import Source, argument, literal_text, read_source
 from grader.grading.model.exercise import Location
 from grader.grading.model.verification import Cause, Difference, DifferenceKind, RecordingFact
 from grader.runtime.model.trace import Fault, GraphSnapshot, LogRecord, Observation, OutputLine, Trace
@@ -100,7 +100,7 @@ def _first_event(
     for index, (one, two) in enumerate(zip_longest(first, other)):
         if _key(one) != _key(two):
             kind = _kind(first, other, index)
-            trees = {name: read(name, text) for name, text in sources.items()}
+            trees = {name: read_source(name, text) for name, text in sources.items()}
             process, place = _place(one or two, trees)
             cause = _cause(one, two, trees.get(process))
             return Difference(kind, index + 1, one, two, process, place.file, place.line, cause)
@@ -169,7 +169,7 @@ def _place(event: Observation | None, sources: Mapping[str, Source]) -> tuple[st
 
 def _publishers(source: Source, topic: str) -> Iterator[ast.Call]:
     for call in source.calls("create_publisher"):
-        named = text_of(argument(call, 1, "topic"))
+        named = literal_text(argument(call, 1, "topic"))
         if named is not None and topic.endswith(f"/{named.lstrip('/')}"):
             yield call
 
@@ -186,7 +186,7 @@ def _cause(one: Observation | None, two: Observation | None, source: Source | No
         return Cause.ADDRESS
     if any(source.calls(*_PROCESSOR_TIME)):
         return Cause.PROCESSOR_TIME
-    texts = (text_of(node) or "" for node in source.all(ast.Constant))
+    texts = (literal_text(node) or "" for node in source.all(ast.Constant))
     if any(source.calls(*_PAST_THE_CLOCK)) or any(word in text for text in texts for word in _KERNEL_FILES):
         return Cause.KERNEL
     return Cause.UNKNOWN

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 
-from grader.grading.judging.authored import breach, is_authored, mistake_in, mistake_of
+from grader.grading.judging.authored import finding_flaw, is_authored, mistake_in, mistake_of
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
 from grader.grading.judging.idle_machine import quicker
@@ -212,7 +212,7 @@ def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Map
             return _author_mistake(mistake_of(criterion.check, error))
         problem = f"the check {name} failed on this recording through no fault of the submission"
         return Answer(problem=problem, error=f"{type(error).__name__}: {quote(str(error))}")
-    if authored and (wrong := breach(finding)):
+    if authored and (wrong := finding_flaw(finding)):
         method = "judge_sources" if sources is not None and reads_sources(criterion.check) else "judge"
         return _author_mistake(mistake_in(criterion.check, method, f"the check {name} {wrong}"))
     if scenario.test is not None:  # the test has decided what ends it

@@ -1,4 +1,4 @@
-"""Finds what a series of numbers follows: a formula, another one instead, an earlier input, or chance."""
+"""Finds what a series of numbers follows: a formula, another one instead, or chance."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import ast
 import math
 import operator
 import statistics
-from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -14,10 +13,9 @@ from functools import lru_cache, partial
 from itertools import pairwise
 from types import MappingProxyType
 
-from grader.grading.judging.values import Reading
 from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, counted, within
+from grader.runtime.model.quantities import counted, within
 
 #: Variables of a formula: the number of a message from 0, and its time in seconds.
 VARIABLES = ("n", "t")
@@ -255,54 +253,6 @@ def _scaled(wanted: Curve, samples: Sequence[Sample], tolerance: float) -> Inste
     if any(math.isclose(factor, f, rel_tol=1e-3) for f in (_DEGREES, 1 / _DEGREES)):
         return Instead(clause, "that is the factor between degrees and radians: publish the value unconverted")
     return Instead(clause)
-
-
-#: Step between the lags that are tried, and the longest lag.
-_STEP_NS, _LONGEST_NS = 100 * NS_PER_MS, 8 * NS_PER_S
-#: Maximum number of inputs that an answer may lag behind.
-_FURTHEST_BEHIND = 25
-#: Minimum share of answers that must fit for a lag to be reported.
-_SURE_BEHIND = 0.97
-#: Fewer answers than this may fit by chance.
-_FEWEST_ANSWERS = 10
-#: Whether an answer (first) is right for an input (second).
-Right = Callable[[float, float], bool]
-
-
-def lag_ns(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int | None:
-    """Return by how much the answers lag behind the inputs that they are right for; None if they do not."""
-    found: int | None = None
-    for lag in range(0, _LONGEST_NS + 1, _STEP_NS):
-        fits = _fits(inputs, answers, right, lag)
-        if fits and lag == 0:
-            return None
-        if fits:
-            found = lag
-        elif found is not None:
-            break
-    return found
-
-
-def _fits(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right, lag: int) -> bool:
-    times = [r.t_ns for r in inputs]
-    asked = [
-        (a.value, inputs[bisect_right(times, a.t_ns - lag) - 1].value) for a in answers if a.t_ns - lag >= times[0]
-    ]
-    changes = len({got for got, _ in asked}) > 1
-    return len(asked) >= _FEWEST_ANSWERS and changes and all(right(got, value) for got, value in asked)
-
-
-def steps_behind(inputs: Sequence[Reading], answers: Sequence[Reading], right: Right) -> int:
-    """Return how many inputs back the input is that nearly every answer is right for; 0 if there is none."""
-    times = [r.t_ns for r in inputs]
-    newest = [(a.value, bisect_right(times, a.t_ns) - 1) for a in answers]
-    for behind in range(_FURTHEST_BEHIND + 1):
-        asked = [(got, inputs[place - behind].value) for got, place in newest if place >= behind]
-        if len(asked) < _FEWEST_ANSWERS or len({got for got, _ in asked}) < 2:
-            return 0
-        if sum(right(got, value) for got, value in asked) >= _SURE_BEHIND * len(asked):
-            return behind
-    return 0
 
 
 #: For fewer values than this, only whether they differ is checked.

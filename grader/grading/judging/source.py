@@ -24,6 +24,7 @@ LONGEST_SOURCE = 100_000
 CODE_LENGTH = 70
 #: Where a node keeps its dotted name.
 _CHAIN = "_chain"
+#: A function of a student's file.
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Loop = ast.While | ast.For
 Scope = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
@@ -201,7 +202,7 @@ class Source:
         return found
 
 
-def read(file: str, text: str) -> Source:
+def read_source(file: str, text: str) -> Source:
     """Return a file as a tree; one that cannot be parsed, or is too long or too deep, has only lines.
 
     Args:
@@ -209,7 +210,7 @@ def read(file: str, text: str) -> Source:
         text: A `SourceText`, whose tree is known, or the text of an author's own test.
     """
     lines = tuple(text[:LONGEST_SOURCE].split("\n"))
-    tree = _kept(text) if isinstance(text, SourceText) else parsed(text)
+    tree = _kept(text) if isinstance(text, SourceText) else parsed_source(text)
     return Source(file, lines) if tree is None else source_of(file, lines, tree)
 
 
@@ -275,7 +276,7 @@ def _place(node: Any) -> tuple[int, int, int]:
     return node.lineno, node.col_offset, -(node.end_lineno or node.lineno)
 
 
-def parsed(text: str) -> ast.Module | None:
+def parsed_source(text: str) -> ast.Module | None:
     """Return the tree of a text; None if it cannot be parsed, or is too long or too deep."""
     if len(text) > LONGEST_SOURCE:
         return None
@@ -343,14 +344,14 @@ def parameters(function: Scope) -> list[str]:
     return [a.arg for a in (*function.args.posonlyargs, *function.args.args)]
 
 
-def text_of(node: ast.AST | None) -> str | None:
+def literal_text(node: ast.AST | None) -> str | None:
     """Return the text of a string literal."""
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
 def quoted_number(node: ast.AST | None) -> str:
     """Return the number that a string literal holds, as in `'0.5'`; empty if it holds none."""
-    text = (text_of(node) or "").strip()
+    text = (literal_text(node) or "").strip()
     return text if text.lstrip("+-").replace(".", "", 1).isdigit() else ""
 
 

@@ -14,9 +14,9 @@ from typing import TypeVar
 from grader.grading.judging.diagnosis import hint_for, placed_in
 from grader.grading.judging.diagnosis.silence import taken_from_executor
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package
-from grader.grading.judging.judge_run import same_names, started, unheard, unserved
+from grader.grading.judging.judge_run import notes_on_unheard, same_names, unserved, unusual_starts
 from grader.grading.judging.simulations import unheard_by_simulations
-from grader.grading.judging.source import read
+from grader.grading.judging.source import read_source
 from grader.grading.judging.values import as_number, published, student_endpoints
 from grader.grading.model.report import Pace, Summary, TopicSummary
 from grader.runtime.model.extras import pip_install
@@ -53,8 +53,15 @@ def summarise(
     graphs = trace.graphs()
     caught = _caught(trace)
     faults = (*trace.faults(), *caught)
-    told = (*started(trace), *same_names(trace), *unheard(trace), *unserved(trace, served), *_stateless(trace))
-    seen = (*told, *unheard_by_simulations(trace), *_taken(trace, sources))
+    seen = (
+        *unusual_starts(trace),
+        *same_names(trace),
+        *notes_on_unheard(trace),
+        *unserved(trace, served),
+        *_stateless(trace),
+        *unheard_by_simulations(trace),
+        *_taken(trace, sources),
+    )
     notes = (*seen, *trace.notes, *(one.sentence for one in trace.newer))
     names = {e.topic for g in graphs for e in g.endpoints}
     return Summary(
@@ -115,7 +122,7 @@ def _taken(trace: Trace, sources: Mapping[str, str]) -> Iterator[str]:
     if all(published(trace, end.topic) for end in student_endpoints(trace, "publisher")):
         return
     for file, text in sources.items():
-        clue = taken_from_executor(read(file, text))
+        clue = taken_from_executor(read_source(file, text))
         if clue is not None and clue.location is not None:
             yield f"{file}:{clue.location.line}: {clue.hint}"
 

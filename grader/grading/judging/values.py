@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache, wraps
 from types import MappingProxyType
@@ -147,11 +147,6 @@ def _readings(messages: Iterable[Message | Delivery], field: str) -> tuple[Readi
     return tuple(Reading(t_ns, value) for t_ns, value in found if value is not None)
 
 
-def last_of_instant(series: Sequence[Reading]) -> tuple[Reading, ...]:
-    """Return one reading per instant: the last one."""
-    return tuple({r.t_ns: r for r in series}.values())
-
-
 @per_trace
 def held(trace: Trace, topic: str, field: str = "", *, heard_from_ns: int = 0) -> tuple[Held, ...]:
     """Return the numbers that the grader published on a topic, merging equal neighbours.
@@ -173,12 +168,12 @@ def _names(path: str) -> tuple[str, ...]:
     return tuple(re.sub(r"\[([0-9]+)\]", r".\1", path).split("."))
 
 
-def leaves(value: Mapping[str, object], prefix: str = "") -> dict[str, float]:
+def numbers_by_path(value: Mapping[str, object], prefix: str = "") -> dict[str, float]:
     """Return every number of a message by path."""
     found: dict[str, float] = {}
     for name, inner in value.items():
         if isinstance(inner, (dict, Mapping)):
-            found |= leaves(inner, f"{prefix}{name}.")
+            found |= numbers_by_path(inner, f"{prefix}{name}.")
         elif (got := as_number(inner)) is not None:
             found[f"{prefix}{name}"] = got
     return found
@@ -303,9 +298,9 @@ class FieldRule:
         """The expected value, for text."""
         parts = []
         if self.equals is not None:
-            parts.append(shown(self.equals))
+            parts.append(shown_value(self.equals))
         if self.items is not None:
-            parts.append(shown(self.items))
+            parts.append(shown_value(self.items))
         if self.low is not None and self.high is not None:
             parts.append(f"{number(self.low)} to {number(self.high)}")
         elif self.low is not None:
@@ -341,13 +336,13 @@ def _keeps(value: Mapping[str, object], path: str, rule: FieldRule) -> bool:
 def breach(value: Mapping[str, object], path: str, rule: RuleOrValue) -> str:
     """Return the found and the expected value at a path, as a clause."""
     try:
-        found = f"{path} is {shown(at_path(value, path))}"
+        found = f"{path} is {shown_value(at_path(value, path))}"
     except NoSuchField:
         found = f"there is no field {path}"
     return f"{found}, expected {as_rule(rule).wanted}"
 
 
-def shown(value: object) -> str:
+def shown_value(value: object) -> str:
     """Return a field's value as text."""
     if value is None:
         return "nothing"
@@ -356,7 +351,7 @@ def shown(value: object) -> str:
     if isinstance(value, str):
         return f"{quote(value, 80)!r}"
     if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(shown, value[:20]))}{', ...' if len(value) > 20 else ''}]"
+        return f"[{', '.join(map(shown_value, value[:20]))}{', ...' if len(value) > 20 else ''}]"
     got = as_number(value)
     return number(got) if got is not None else quote(str(value), 80)
 

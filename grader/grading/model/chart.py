@@ -7,6 +7,7 @@ from enum import Enum
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import GraphSnapshot
 
+#: Horizontal and vertical value of a point of a series.
 Point = tuple[float, float]
 
 

@@ -21,7 +21,7 @@ _GRADER = "rclpy-grader"
 _Kind = TypeVar("_Kind")
 
 
-def names(group: str) -> list[str]:
+def registered_names(group: str) -> list[str]:
     """Return the names that installed packages register, in order; nothing of them is imported.
 
     Names that cannot be used are left out, and all if the metadata of a package cannot be read: `load` says why.
@@ -32,7 +32,7 @@ def names(group: str) -> list[str]:
         return []
 
 
-def load(group: str, name: str, kind: type[_Kind], expected: str) -> tuple[_Kind, str] | None:
+def load_registered(group: str, name: str, kind: type[_Kind], expected: str) -> tuple[_Kind, str] | None:
     """Import what a package registers by a name, and return it with the words that name it in messages.
 
     Return None if no package registers the name. Raises EnvironmentFault, which names the package and the entry point,

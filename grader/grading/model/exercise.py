@@ -132,7 +132,7 @@ class Variant:
     @property
     def text(self) -> str:
         """The values with their names, for readers."""
-        return ", ".join(f"{name.replace('_', ' ')} {written(value)}" for name, value in self.values)
+        return ", ".join(f"{name.replace('_', ' ')} {written_value(value)}" for name, value in self.values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ def variant_notes(variant: Variant | None) -> tuple[str, ...]:
     return () if variant is None else (f"graded by the variant of {variant.student}: {variant.text}",)
 
 
-def written(value: Value) -> str:
+def written_value(value: Value) -> str:
     """Format a value as in a rubric."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
@@ -310,7 +310,7 @@ class Check(Protocol):
             """
 
 
-def has(check: object, member: str) -> bool:
+def has_member(check: object, member: str) -> bool:
     """Return whether a check has an optional member of `Check` of its own."""
     return getattr(type(check), member, vars(Check)[member]) is not vars(Check)[member] or member in _own(check)
 
@@ -329,7 +329,7 @@ class SourceCheck(Protocol):
 
 def reads_sources(check: object) -> TypeGuard[SourceCheck]:
     """Return whether a check also reads the students' files."""
-    return has(check, "judge_sources")
+    return has_member(check, "judge_sources")
 
 
 def ask(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
@@ -341,7 +341,7 @@ def ask(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Findin
 
 def of_beginning(check: Check) -> Check | None:
     """Return the check that judges the beginning of a recording on the wall clock; None if none can."""
-    if not has(check, "of_beginning"):
+    if not has_member(check, "of_beginning"):
         return check
     found: Check | None = check.of_beginning()  # type: ignore[attr-defined]
     return found
@@ -353,7 +353,7 @@ def roles_of(kind: type) -> Roles:
     return declared if isinstance(declared, Roles) else Roles()
 
 
-def named(check: object, *parameters: str) -> tuple[str, ...]:
+def texts_under(check: object, *parameters: str) -> tuple[str, ...]:
     """Return the texts that a check holds under the names of parameters, without duplicates and empty ones."""
     found = (getattr(check, name, None) for name in parameters)
     return tuple(dict.fromkeys(text for text in found if isinstance(text, str) and text))

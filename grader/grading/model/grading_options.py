@@ -319,6 +319,6 @@ def paths(options: GradingOptions) -> list[Path]:
     return found
 
 
-def names(command: str, record: type[GradingOptions] = GradingOptions) -> Sequence[str]:
+def option_names(command: str, record: type[GradingOptions] = GradingOptions) -> Sequence[str]:
     """Return the names of the options that a command has."""
     return [name for name, row, _ in rows(record) if command in row.commands]

@@ -297,7 +297,7 @@ class CriterionExplanation:
     parameters: tuple[CheckParameter, ...]  # with the values of the rubric
 
 
-def exit_code(report: Report, min_score: Fraction | None) -> int:
+def report_exit_code(report: Report, min_score: Fraction | None) -> int:
     """Return the exit code for a report as its reader may see it.
 
     The share of the points, in percent, that counts as success is `min_score`; None requires every criterion.

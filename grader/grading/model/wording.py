@@ -70,7 +70,7 @@ def nearest(name: str, candidates: Iterable[str]) -> str | None:
     return next(iter(alike), None)
 
 
-def listed(items: Sequence[str], limit: int = 4) -> str:
+def first_few(items: Sequence[str], limit: int = 4) -> str:
     """Return items as `a, b and 2 more`."""
     shown = [quote(i, 80) for i in items[:limit]]
     rest = len(items) - len(shown)

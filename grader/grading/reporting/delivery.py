@@ -16,14 +16,14 @@ from grader.grading.model.report import Report
 from grader.grading.reporting.audience import ANYBODY, Readers
 from grader.grading.reporting.escape import encoded
 from grader.grading.reporting.formats import FORMATS, PageLayout, check_surroundings, known, rendered
-from grader.runtime.files import beside, is_special, target_of, write_whole
+from grader.runtime.files import beside, is_special, link_target, write_whole
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
 
 
 def check_writable(path: Path) -> None:
     """Raise OSError if a report cannot be written to a path; what is there is not changed."""
-    target = target_of(path)
+    target = link_target(path)
     if is_special(target):
         return
     if target.is_dir():
@@ -50,7 +50,7 @@ class Output:
     evidence: Path | None = None  # the folder of the kept evidence, which a page names; None if none is kept
 
 
-def prepared(outputs: Sequence[Output], *, verbose: bool = False) -> tuple[Output, ...]:
+def prepared_outputs(outputs: Sequence[Output], *, verbose: bool = False) -> tuple[Output, ...]:
     """Return all reports to deliver, files first, after checking that each can be written.
 
     If nothing goes to standard output, the text report is added. Texts show everything if `verbose`. Raises

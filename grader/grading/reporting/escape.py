@@ -250,12 +250,12 @@ def _cut(pieces: list[str], length: int, limit: int) -> str:
     return "".join(pieces) + ELLIPSIS
 
 
-def command_line(words: Sequence[str]) -> str:
+def shell_line(words: Sequence[str]) -> str:
     """Return words as one line for a POSIX shell, or for bash where a word is unprintable."""
-    return " ".join(map(quoted, words))
+    return " ".join(map(shell_quoted, words))
 
 
-def quoted(word: str) -> str:
+def shell_quoted(word: str) -> str:
     """Return a word quoted for a shell, on one line; unprintable characters use the quotes of bash."""
     if word.isprintable():
         return shlex.quote(word)

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
-from grader.grading.model.exercise import Exercise, Variant, written
+from grader.grading.model.exercise import Exercise, Variant, written_value
 from grader.grading.model.report import (
     CheckExplanation,
     CheckParameter,
@@ -161,7 +161,8 @@ def render_sheet(exercise: Exercise) -> str:
     if variant is None:
         return f"{title}\nThis exercise is the same for everybody.\n"
     rows = [
-        f"| {markdown(name.replace('_', ' '))} | {markdown_code(written(value))} |" for name, value in variant.values
+        f"| {markdown(name.replace('_', ' '))} | {markdown_code(written_value(value))} |"
+        for name, value in variant.values
     ]
     whose = f"\nThe values of {markdown(variant.student)}:\n"
     return "\n".join([title + whose, "| | |", "|:--|:--|", *rows]) + "\n"

@@ -121,7 +121,7 @@ FORMATS: dict[str, Format] = {
 
 def added_formats() -> list[str]:
     """Return the names of the formats that other packages add; names of the grader's own formats stay its own."""
-    return [name for name in entry_points.names(entry_points.FORMATS) if name not in (*FORMATS, EVIDENCE)]
+    return [name for name in entry_points.registered_names(entry_points.FORMATS) if name not in (*FORMATS, EVIDENCE)]
 
 
 @cache
@@ -132,7 +132,7 @@ def format_of(name: str) -> Format | None:
     """
     if name in FORMATS:
         return FORMATS[name]
-    found = entry_points.load(entry_points.FORMATS, name, Format, "a Format of grader.api")
+    found = entry_points.load_registered(entry_points.FORMATS, name, Format, "a Format of grader.api")
     if found is None:
         return None
     added, where = found

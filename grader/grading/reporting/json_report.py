@@ -11,8 +11,8 @@ from typing import Any, NotRequired, TypedDict
 
 from grader.grading.model.exercise import Problem
 from grader.grading.model.report import SCHEMA, ExerciseReport, JsonObject, Report, ReportedFault, Verdict
-from grader.grading.reporting.escape import command_line, json_value
-from grader.runtime.model.checkup import described
+from grader.grading.reporting.escape import json_value, shell_line
+from grader.runtime.model.checkup import isolation_line
 from grader.runtime.model.quantities import seconds
 from grader.runtime.model.trace import Start
 
@@ -90,7 +90,7 @@ def report_to_json(report: Report) -> ReportData:
             "submission": {"name": report.name, "path": report.path, "digest": report.digest},
             "environment": {
                 **asdict(environment),
-                "isolation": described(environment.isolation, environment.containment),
+                "isolation": isolation_line(environment.isolation, environment.containment),
             },
             "score": report.score,
             "max_score": report.max_score,
@@ -98,7 +98,7 @@ def report_to_json(report: Report) -> ReportData:
             "duration_s": Fraction(report.duration_s),
             "exercises": [_exercise(exercise, report) for exercise in report.exercises],
             "reproduce": {
-                "command": command_line(report.reproduce.command),
+                "command": shell_line(report.reproduce.command),
                 "seed": report.seed,
                 "rubrics": dict(report.reproduce.rubrics),
                 "recording": report.reproduce.recording or None,

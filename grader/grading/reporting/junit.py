@@ -54,7 +54,7 @@ def _suite(exercise: ExerciseReport, report: Report, folder: str) -> ET.Element:
         wording.exercise_line(exercise),
         *wording.remarks(exercise),
         *wording.opening(report),
-        *wording.ending(report),
+        *wording.ending_lines(report),
     ]
     ET.SubElement(suite, "system-out").text = xml_text("\n".join(lines), limit=200_000)
     return suite

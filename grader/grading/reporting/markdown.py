@@ -142,7 +142,7 @@ def _more(count: int, what: str) -> list[str]:
 
 
 def _foot(report: Report) -> list[str]:
-    rows = [f"- {name}: {markdown_code(value)}" for name, value in wording.reproduction(report)]
-    command = " ".join(wording.command(report))
+    rows = [f"- {name}: {markdown_code(value)}" for name, value in wording.reproduction_lines(report)]
+    command = " ".join(wording.reproducing_command(report))
     again = ["\nTo reproduce this report:\n", markdown_block(command, limit=len(command) + 1) + "\n"] if command else []
     return ["---\n", *rows, *again]

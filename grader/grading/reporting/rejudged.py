@@ -110,7 +110,7 @@ class ChangesSummary:
     criteria: tuple[CriterionSummary, ...]
 
 
-def summarise(changes: Sequence[ReportChange]) -> ChangesSummary:
+def summarise_changes(changes: Sequence[ReportChange]) -> ChangesSummary:
     """Summarise the changes of a class; there must be at least one, which may be empty."""
     rows: dict[tuple[str, str], list[CriterionChange]] = {}
     for row in (row for each in changes for row in each.criteria):
@@ -181,7 +181,7 @@ class RejudgedResult:
     report: str = ""  # the new report as JSON text; empty if not requested
 
 
-def render_results(results: Sequence[RejudgedResult]) -> str:
+def render_rejudged(results: Sequence[RejudgedResult]) -> str:
     """Return one line for each submission, in the order given, then those that were refused."""
     judged = [r for r in results if not r.problem]
     width = max((len(_name(r.name)) for r in judged), default=0)
@@ -204,14 +204,14 @@ def render_changes(results: Sequence[RejudgedResult]) -> str:
     return "\n".join([*lines, *incomparable, *_refused(results), f"unchanged: {same} of {len(judged)}"]) + "\n"
 
 
-def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
+def rejudged_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
     """Return a class as JSON text: every report, or with `changes` the changes, losses first."""
     judged = [r for r in results if not r.problem]
     data: dict[str, object] = {"schema": SCHEMA}
     if changes:
         ordered = dropped_first([r.change for r in judged if r.change is not None])
         compared = [r.change for r in judged if r.change is not None]
-        data["summary"] = asdict(summarise(compared)) if compared else None
+        data["summary"] = asdict(summarise_changes(compared)) if compared else None
         data["changed"] = [{**asdict(c), "gain": c.gain} for c in ordered]
         data["unchanged"] = [r.name for r in judged if r.change is not None and not r.change.criteria]
         data["not_compared"] = [r.name for r in judged if r.change is None]
@@ -223,7 +223,7 @@ def results_to_json(results: Sequence[RejudgedResult], *, changes: bool) -> str:
 
 def change_summary(changes: Sequence[ReportChange]) -> list[str]:
     """Return how a class changed in a few lines: how many up and down, the mean, then each criterion."""
-    found = summarise(changes)
+    found = summarise_changes(changes)
     if not found.changed:
         return [f"changed: 0 of {found.compared}"]
     mean = f"mean {found.mean_before:.1f} -> {found.mean_after:.1f} %"

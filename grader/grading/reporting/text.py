@@ -248,11 +248,11 @@ def _foot(page: Page, report: Report) -> None:
     notes = wording.relevant_notes(report)
     _notes(page, notes, indent="", most=len(notes))
     page.put(wording.run_line(report), style="dim")
-    for name, value in wording.reproduction(report):
+    for name, value in wording.reproduction_lines(report):
         loud = name == "isolation" and wording.ran_without_sandbox(report)
         page.put(value, prefix=_row(name), style="bold red" if loud else "dim")
     prefix = _row("reproduce")
-    for line in _command_lines(wording.command(report), page.width - prefix.cell_len):
+    for line in _command_lines(wording.reproducing_command(report), page.width - prefix.cell_len):
         page.put(line, prefix=prefix)
         prefix = Text(" " * prefix.cell_len)
 

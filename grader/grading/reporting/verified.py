@@ -119,10 +119,10 @@ def _first_difference(page: Page, verification: Verification) -> None:
     page.put(f"First difference, {one.words}", style="bold")
     page.put(_KINDS[difference.kind], prefix="  kind   ")
     page.put(_where(place, difference), prefix="  where  ")
-    sides = described(difference)
+    sides = both_sides(difference)
     page.put(sides[0], prefix="  first  ")
     page.put(sides[1], prefix="  other  ")
-    page.put(advice(verification, difference), prefix="  do     ")
+    page.put(advice_on(verification, difference), prefix="  do     ")
     others = [f"{each.words}: {_where(where, which)}" for each, where, which in found[1:]]
     if others:
         page.blank()
@@ -144,7 +144,7 @@ def _where(place: Place, difference: Difference) -> str:
     return f"{_place(place)}{event}{f', {at}' if at else ''}"
 
 
-def described(difference: Difference) -> tuple[str, str]:
+def both_sides(difference: Difference) -> tuple[str, str]:
     """Return both sides of a difference in a line each; of long ones, what surrounds the first difference."""
     one, two = _words(difference.first), _words(difference.other)
     differs = next((n for n, (a, b) in enumerate(zip_longest(one, two)) if a != b), 0)
@@ -198,7 +198,7 @@ def _fields(value: Mapping[str, object]) -> str:
     return json.dumps(json_value(dict(value)), ensure_ascii=False)
 
 
-def advice(verification: Verification, difference: Difference) -> str:
+def advice_on(verification: Verification, difference: Difference) -> str:
     """Return one thing to do about a difference."""
     if difference.kind is DifferenceKind.GRADER:
         return "report it with the output of --json: no program caused it"

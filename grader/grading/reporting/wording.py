@@ -9,7 +9,7 @@ from math import floor
 
 from grader.grading.model.exercise import Audience, Outcome, exercise_name
 from grader.grading.model.report import NOT_JUDGED, ExerciseReport, Report, ReportedFault, Verdict
-from grader.grading.reporting.escape import quoted, shown
+from grader.grading.reporting.escape import shell_quoted, shown
 from grader.runtime.model.checkup import NO_SANDBOX, summarised
 from grader.runtime.model.quantities import seconds
 from grader.runtime.model.trace import ClockKind
@@ -169,10 +169,10 @@ def remarks(exercise: ExerciseReport) -> list[str]:
     ]
 
 
-def ending(report: Report) -> list[str]:
+def ending_lines(report: Report) -> list[str]:
     """Return the lines that help to reproduce the report, the command last; each safe to show as a line of text."""
-    rows = [f"{name}: {value}" for name, value in reproduction(report)]
-    words = command(report)
+    rows = [f"{name}: {value}" for name, value in reproduction_lines(report)]
+    words = reproducing_command(report)
     return [*rows, f"reproduce: {' '.join(words)}"] if words else rows
 
 
@@ -182,7 +182,7 @@ def overview(report: Report) -> list[str]:
     for exercise in report.exercises:
         found = remarks(exercise)
         lines += ["", exercise_line(exercise), *found] if found else []
-    return [*lines, "", *ending(report)]
+    return [*lines, "", *ending_lines(report)]
 
 
 def _capped(lines: list[str], most: int, what: str) -> list[str]:
@@ -251,7 +251,7 @@ def starts(report: Report) -> list[str]:
     return [shown(f"{start.process}: run {start.words}", limit=_WORD_LIMIT) for start in found]
 
 
-def reproduction(report: Report) -> list[tuple[str, str]]:
+def reproduction_lines(report: Report) -> list[tuple[str, str]]:
     """Return names and values that reproduce the report, except the command; safe to show as lines of text.
 
     Students get the seed and the clock: the rest helps whoever runs the grader.
@@ -267,7 +267,7 @@ def reproduction(report: Report) -> list[tuple[str, str]]:
     return [(name, shown(value, limit=_WORD_LIMIT)) for name, value in rows]
 
 
-def command(report: Report) -> list[str]:
+def reproducing_command(report: Report) -> list[str]:
     """Return the command that reproduces the report, quoted for a shell and safe to show as text; none for students.
 
     Join the pieces with spaces; an option and its value are one piece.
@@ -276,7 +276,7 @@ def command(report: Report) -> list[str]:
     if report.audience is Audience.STUDENT:
         return pieces
     for word in report.reproduce.command:
-        text = shown(quoted(word), limit=_WORD_LIMIT)
+        text = shown(shell_quoted(word), limit=_WORD_LIMIT)
         if pieces and pieces[-1].startswith("--") and " " not in pieces[-1]:
             pieces[-1] += f" {text}"
         else:

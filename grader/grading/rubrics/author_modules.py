@@ -15,13 +15,13 @@ from types import ModuleType
 from typing import Any
 
 from grader.grading.model.exercise import HintRule
-from grader.runtime.model.author_files import run
+from grader.runtime.model.author_files import run_author_file
 from grader.runtime.model.dataclass import dataclass
 
 
 def module_of(path: str, content: bytes) -> ModuleType:
     """Return the module of a file, whose checks other processes can recreate."""
-    module = run("_own_checks", path, content)
+    module = run_author_file("_own_checks", path, content)
     for kind in vars(module).values():
         if isinstance(kind, type) and kind.__module__ == module.__name__ and dataclasses.is_dataclass(kind):
             copyreg.pickle(kind, _reduced)

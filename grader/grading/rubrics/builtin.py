@@ -14,7 +14,7 @@ from grader.grading.model.rubric_files import rubrics_in
 from grader.runtime.compiled import COMPILED, compiled, state_in, state_of_package
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.shipped import shipped
 
 #: The type of the messages in the recording that ships with the grader.
@@ -69,7 +69,7 @@ def headers_in(rubrics: Path) -> tuple[Header, ...]:
     """Return the headers of the rubrics in a folder, ordered by exercise number; raises RubricError without any."""
     paths = rubrics_in(rubrics)
     if not paths:
-        raise RubricError(f"{shown(str(rubrics), 500)}: expected the built-in rubrics, found none", "install again")
+        raise RubricError(f"{printable(str(rubrics), 500)}: expected the built-in rubrics, found none", "install again")
     return tuple(sorted(map(_header, paths), key=lambda header: _number_order(header.number)))
 
 

@@ -54,7 +54,7 @@ from grader.grading.rubrics.types import (
     Topic,
     Whole,
     YesNo,
-    build,
+    plain_value,
     wrong,
 )
 from grader.grading.rubrics.units import format_quantity
@@ -117,7 +117,7 @@ class _Parameters(Shape):
     def built(self) -> object:
         """Return the dataclass, with defaults for what is left out; raises ValueError if it rejects the values."""
         fields = [f.name for f in dataclasses.fields(self.made) if self._is_given(f)]
-        return self.made(**{name: build(getattr(self, _PREFIX + name)) for name in fields})
+        return self.made(**{name: plain_value(getattr(self, _PREFIX + name)) for name in fields})
 
     def _is_given(self, field: dataclasses.Field[object]) -> bool:
         return _is_required(field) or _PREFIX + field.name in self.model_fields_set
@@ -163,7 +163,9 @@ class _SimulationParameters(Shape):
     def built(self) -> Simulated:
         """Return the stimulus, with the parameters that are given."""
         # Values are drawn in this order; that of the set of names is another one in each process.
-        given = {name: build(getattr(self, name)) for name in type(self).model_fields if name in self.model_fields_set}
+        given = {
+            name: plain_value(getattr(self, name)) for name in type(self).model_fields if name in self.model_fields_set
+        }
         parameters = {key.removeprefix(_PREFIX): value for key, value in given.items()}
         return Simulated(self.name, parameters, self.path, self.content)
 

@@ -22,8 +22,8 @@ from grader.grading.rubrics.types import (
     Topic,
     Whole,
     YesNo,
-    build,
     must,
+    plain_value,
     wrong,
 )
 from grader.runtime.model.limits import MAX_CALLS, MAX_CASES, MAX_CLIENTS
@@ -169,7 +169,7 @@ class _CasesShape(Shape):
 
     def built(self) -> object:
         """Return the cases as a scenario holds them."""
-        return self.made(*(build(getattr(self, name)) for name in type(self).model_fields))
+        return self.made(*(plain_value(getattr(self, name)) for name in type(self).model_fields))
 
 
 class InOrderShape(_CasesShape):
@@ -313,7 +313,7 @@ class ParameterShape(Shape):
         """Return the equivalent service call."""
         if self.set is None:
             return _call(self, "get_parameters", "rcl_interfaces/srv/GetParameters", {"names": (self.name,)})
-        wanted: Mapping[str, FieldSpec] = {"name": self.name, "value": _parameter_value(build(self.set))}
+        wanted: Mapping[str, FieldSpec] = {"name": self.name, "value": _parameter_value(plain_value(self.set))}
         return _call(self, "set_parameters", "rcl_interfaces/srv/SetParameters", {"parameters": (wanted,)})
 
 
@@ -345,7 +345,7 @@ class StateShape(Shape):
 def _call(
     shape: ParameterShape | TransitionShape | StateShape, service: str, kind: str, request: Mapping[str, FieldSpec]
 ) -> ServiceCalls:
-    return ServiceCalls(f"{shape.node or '~'}/{service}", kind, (request,), start_ns=build(shape.start))
+    return ServiceCalls(f"{shape.node or '~'}/{service}", kind, (request,), start_ns=plain_value(shape.start))
 
 
 #: Name and number of each type in rcl_interfaces/msg/ParameterValue; the first element decides that of a list.

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from grader.grading.judging.checks import CHECKS
 from grader.grading.rubrics.author_modules import OwnHints
-from grader.grading.rubrics.own_checks import load, load_hints, own_files
+from grader.grading.rubrics.own_checks import load_checks, load_hints, own_files
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.shipped import shipped
 
@@ -44,7 +44,9 @@ def hints_of(names: Iterable[str]) -> OwnHints:
 @cache
 def _exercises() -> tuple[_Shared, ...]:
     folders = sorted(path.parent for path in shipped("rubrics").glob(f"*/{CHECK_FILE}"))
-    return tuple(_Shared(load(own_files(folder / CHECK_FILE, [CHECK_FILE]), CHECKS), folder) for folder in folders)
+    return tuple(
+        _Shared(load_checks(own_files(folder / CHECK_FILE, [CHECK_FILE]), CHECKS), folder) for folder in folders
+    )
 
 
 @cache

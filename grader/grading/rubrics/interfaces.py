@@ -14,17 +14,17 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 import msgspec
 
 from grader.grading.judging.series import curve
-from grader.grading.rubrics.mistakes import found, nearest
+from grader.grading.rubrics.mistakes import found, nearest_hint
 from grader.grading.rubrics.model import RubricShape
 from grader.grading.rubrics.simulations import Offered, offered, simulated_in
-from grader.grading.rubrics.types import build
+from grader.grading.rubrics.types import plain_value
 from grader.grading.rubrics.yaml_tree import Mistake, Position, TreePath, YamlTree
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import FieldOf
 from grader.runtime.model.scenario import Stimulus
 from grader.runtime.model.submission import Definition
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 #: Numbers of type_description_interfaces/msg/FieldType: a nested message, integers, floating-point numbers, and so on.
 #: Arrays add 48, bounded sequences 96 and unbounded ones 144.
@@ -207,11 +207,11 @@ class Interfaces:
         packages = {name.partition("/")[0] for name in self.names}
         if package not in packages:
             bring = f"install {package}, or bring its definitions with `interfaces:` or --interfaces FOLDER"
-            hint = nearest(package, packages) or bring
+            hint = nearest_hint(package, packages) or bring
             return where.mistake(f"expected an installed package, found `{package}`", hint)
         known = [name for name in self.of_kind(kind) if name.startswith(f"{package}/")]
-        hint = nearest(type_, known) or (f"{package} has {listed([name.rpartition('/')[2] for name in known])}")
-        return where.mistake(f"expected a {_KINDS[kind]} type of {package}, found `{shown(type_)}`", hint)
+        hint = nearest_hint(type_, known) or (f"{package} has {listed([name.rpartition('/')[2] for name in known])}")
+        return where.mistake(f"expected a {_KINDS[kind]} type of {package}, found `{printable(type_)}`", hint)
 
     def at_path(self, type_: str, path: str) -> Field | str:
         """Return the field at a path of a type, or the element of a list; a text with what is wrong if there is none.
@@ -318,7 +318,7 @@ class _Checked:
         known = self._interfaces.fields(type_)
         for name, inner in value.items() if known is not None else ():
             if name not in (known or {}):
-                return f"what it publishes on {where} has a field `{shown(name)}`: {_no_field(type_, known or {})}"
+                return f"what it publishes on {where} has a field `{printable(name)}`: {_no_field(type_, known or {})}"
             field = (known or {})[name]
             items = inner if field.is_list and isinstance(inner, (list, tuple)) else [inner]
             for item in items:
@@ -340,8 +340,8 @@ class _Checked:
         known = self._interfaces.fields(type_) or {}
         for name, inner in value.items():
             if name not in known:
-                text = f"{_no_field(type_, known)}, found `{shown(name)}`"
-                yield self._tree.at_key((*path, name)).mistake(text, nearest(name, known))
+                text = f"{_no_field(type_, known)}, found `{printable(name)}`"
+                yield self._tree.at_key((*path, name)).mistake(text, nearest_hint(name, known))
             else:
                 yield from self._in_value(inner, known[name], (*path, name))
 
@@ -383,10 +383,10 @@ class _Checked:
         answer = answers[0] if named else f"expected a field of an installed {_KINDS[kind]} type"
         if isinstance(answer, Field):
             inside = [f"`{path}.{name}`" for name in self._interfaces.fields(answer.type.nested_type_name) or ()]
-            yield where.mistake(f"expected a field with a value ({listed(inside)}), found `{shown(path)}`")
+            yield where.mistake(f"expected a field with a value ({listed(inside)}), found `{printable(path)}`")
         else:
             known = [one for type_ in types for one in self._every_path(type_) if not path.startswith(one)]
-            yield where.mistake(f"{answer}, found `{shown(path)}`", nearest(path, known))
+            yield where.mistake(f"{answer}, found `{printable(path)}`", nearest_hint(path, known))
 
     def _every_path(self, type_: str, prefix: str = "") -> Iterator[str]:
         for name, field in (self._interfaces.fields(type_) or {}).items():
@@ -399,7 +399,7 @@ class _Checked:
 def _stimuli(rubric: RubricShape) -> Iterator[tuple[TreePath, Stimulus]]:
     for index, scenario in enumerate(rubric.scenarios):
         for number, shape in enumerate(scenario.stimuli):
-            yield ("scenarios", index, "stimuli", number, shape.chosen[0]), build(shape)
+            yield ("scenarios", index, "stimuli", number, shape.chosen[0]), plain_value(shape)
 
 
 def _simulated(rubric: RubricShape) -> Iterator[tuple[TreePath, Offered]]:
@@ -412,7 +412,7 @@ def _checks(rubric: RubricShape) -> Iterator[tuple[TreePath, Any]]:
     for index, criterion in enumerate(rubric.criteria):
         name, parameters = criterion.check.chosen
         try:
-            yield ("criteria", index, "check", name), build(parameters)
+            yield ("criteria", index, "check", name), plain_value(parameters)
         except ValueError:
             continue  # a mistake that is found where criteria are built
 

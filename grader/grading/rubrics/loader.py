@@ -21,25 +21,25 @@ from grader.grading.rubrics.author_modules import OwnHints
 from grader.grading.rubrics.draws import Draw, First
 from grader.grading.rubrics.exercise_checks import hints_of, known_checks
 from grader.grading.rubrics.interfaces import Interfaces, interface_mistakes
-from grader.grading.rubrics.mistakes import mistakes_of, nearest
+from grader.grading.rubrics.mistakes import mistakes_of, nearest_hint
 from grader.grading.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
 from grader.grading.rubrics.own_checks import (
     OwnFile,
     OwnSimulation,
     bag_files,
     definition_files,
-    digest_of,
-    load,
+    load_checks,
     load_hints,
     load_simulations,
     named_bags,
     named_files,
     own_files,
+    rubric_digest,
 )
 from grader.grading.rubrics.run_options import RunShape
 from grader.grading.rubrics.simulations import published_by, simulation_mistakes
 from grader.grading.rubrics.tests import AuthoredTest, tests_in
-from grader.grading.rubrics.types import BESIDE, CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, build
+from grader.grading.rubrics.types import BESIDE, CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, plain_value
 from grader.grading.rubrics.variants import (
     VariantOptions,
     Variants,
@@ -76,7 +76,7 @@ from grader.runtime.model.scenario import (
     longest,
     shortest,
 )
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 
 def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
@@ -97,21 +97,21 @@ def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
 def _repeated(names: Sequence[str], path: TreePath, tree: YamlTree, key: str = "") -> Iterator[Mistake]:
     for index, name in enumerate(names):
         if name in names[:index]:
-            text = f"expected each {key or 'name'} in `{path[-1]}` once, found `{shown(name)}` again"
+            text = f"expected each {key or 'name'} in `{path[-1]}` once, found `{printable(name)}` again"
             yield tree.at((*path, index, key) if key else (*path, index)).mistake(text)
 
 
 def _unknown(name: str, known: Iterable[str], what: str, where: Position) -> Iterator[Mistake]:
     known = list(dict.fromkeys(known))
     if name not in known:
-        text = f"expected {what} ({listed([shown(one, 40) for one in known])}), found `{shown(name)}`"
-        yield where.mistake(text, nearest(name, known))
+        text = f"expected {what} ({listed([printable(one, 40) for one in known])}), found `{printable(name)}`"
+        yield where.mistake(text, nearest_hint(name, known))
 
 
 def _both(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
     for index, name in enumerate(rubric.provided):
         if name in rubric.files:
-            text = f"expected a file that students do not hand in, found `{shown(name)}`, which is in `files`"
+            text = f"expected a file that students do not hand in, found `{printable(name)}`, which is in `files`"
             yield tree.at(("provided", index)).mistake(text)
 
 
@@ -128,15 +128,15 @@ def _in_scenario(scenario: ScenarioShape, index: int, rubric: RubricShape, tree:
     known, what = scenario.processes, "one of `processes`"
     for number, process in enumerate(scenario.may_exit):
         yield from _unknown(process, known, what, tree.at((*path, "may_exit", number)))
-    observed: Span = build(scenario.observe)
+    observed: Span = plain_value(scenario.observe)
     for process in scenario.run:
         yield from _unknown(process, known, what, tree.at_key((*path, "run", process)))
     for process, start in scenario.start.items():
         yield from _unknown(process, known, what, tree.at_key((*path, "start", process)))
-        yield from _too_late(build(start), observed, (*path, "start", process), tree)
-    connections: tuple[Connection, ...] = build(scenario.connections)
+        yield from _too_late(plain_value(start), observed, (*path, "start", process), tree)
+    connections: tuple[Connection, ...] = plain_value(scenario.connections)
     for number, shape in enumerate(scenario.stimuli):
-        stimulus = build(shape)
+        stimulus = plain_value(shape)
         yield from _in_stimulus(stimulus, observed, (*path, "stimuli", number, shape.chosen[0]), tree)
         late_ns = max((longest(one.delay_ns) for one in connections if one.topic in published_by(stimulus)), default=0)
         yield from _cut_off(stimulus, observed, late_ns, (*path, "observe", "duration"), tree)
@@ -147,7 +147,7 @@ def _in_connections(
     connections: Sequence[Connection], scenario: ScenarioShape, observed: Span, path: TreePath, tree: YamlTree
 ) -> Iterator[Mistake]:
     yield from _repeated([one.topic for one in connections], (*path, "connections"), tree, "topic")
-    published = [topic for shape in scenario.stimuli for topic in published_by(build(shape))]
+    published = [topic for shape in scenario.stimuli for topic in published_by(plain_value(shape))]
     for number, one in enumerate(connections):
         here = (*path, "connections", number)
         yield from _unknown(one.topic, published, "a topic that a stimulus publishes on", tree.at((*here, "topic")))
@@ -173,7 +173,7 @@ def _in_run(process: str, options: RunShape, rubric: RubricShape, path: TreePath
             text = f"expected only `launch_arguments` for a launch file, found `{key}`"
             yield tree.at_key((*path, key)).mistake(text, "a launch file itself says what its nodes are given")
         if not is_launch_file(process) and key == "launch_arguments":
-            text = f"expected `launch_arguments` for a launch file only, found it for `{shown(process)}`"
+            text = f"expected `launch_arguments` for a launch file only, found it for `{printable(process)}`"
             yield tree.at_key((*path, key)).mistake(text, "name launch files like robot.launch.py")
 
 
@@ -299,7 +299,7 @@ def read_rubric(
     simulated = own_files(path, _own_names(path, tree, "simulations"), submissions, key="simulations")
     others = own_files(path, _own_names(path, tree, "provided"), submissions, key="provided")
     tests = own_files(path, _own_names(path, tree, "pytest"), submissions, key="pytest")
-    own = load(files, CHECKS if checks is None else checks)
+    own = load_checks(files, CHECKS if checks is None else checks)
     usable = {**(known_checks() if checks is None else checks), **own}
     provided = {one.name: _provided(one) for one in others}
     brought = _Brought(
@@ -313,7 +313,7 @@ def read_rubric(
     )
     definitions = definition_files(path, folders := _own_names(path, tree, "interfaces"), submissions)
     bags = bag_files(path, named_bags(tree.data), submissions)
-    digest = digest_of(
+    digest = rubric_digest(
         content, tuple(dict.fromkeys((*files, *hints, *others, *simulated, *tests, *definitions, *bags)))
     )
     if interfaces is not None and folders:
@@ -348,7 +348,7 @@ def _variant(
 
 def _provided(file: OwnFile) -> str:
     """Return the text of a provided file; raises RubricError if ROS could not read it."""
-    where = shown(str(file.path), 500)
+    where = printable(str(file.path), 500)
     try:
         text = file.content.decode()
         if not _is_yaml(file.name):
@@ -389,7 +389,7 @@ def _exercise(
         mistakes += interface_mistakes(rubric, tree, interfaces)
     if mistakes:
         _refuse(path, mistakes)
-    limits = build(rubric.limits)
+    limits = plain_value(rubric.limits)
     rules = brought.hints + hints_of({criterion.check_name for criterion in criteria} - brought.own)
     return Exercise(
         id=rubric.exercise.id,
@@ -417,13 +417,13 @@ def _of_tests(rubric: RubricShape, brought: _Brought, tree: YamlTree) -> Iterato
     earlier = [criterion.id for criterion in rubric.criteria]
     file = "" if brought.test_file is None else brought.test_file.name
     for test in brought.tests:
-        place = f"{shown(file)}:{test.line}: `{shown(test.name)}`"
+        place = f"{printable(file)}:{test.line}: `{printable(test.name)}`"
         if test.id in taken:
             yield where.mistake(f"{place}: expected a new id, found `{test.id}`, which is taken")
         for need in test.needs:
             if need not in earlier:
-                text = f"{place}: expected `needs` to name an earlier criterion, found `{shown(need)}`"
-                yield where.mistake(text, nearest(need, earlier))
+                text = f"{place}: expected `needs` to name an earlier criterion, found `{printable(need)}`"
+                yield where.mistake(text, nearest_hint(need, earlier))
         earlier.append(test.id)
 
 
@@ -467,7 +467,7 @@ def side_files(path: Path) -> tuple[OwnFile, ...]:
 def own_checks(path: Path) -> Mapping[str, type]:
     """Return a rubric's own checks by name, used or not; raises RubricError like `read_rubric`."""
     path = rubric_file(path)
-    return load(own_files(path, _own_names(path, _tree(path, _content(path)), "checks")), CHECKS)
+    return load_checks(own_files(path, _own_names(path, _tree(path, _content(path)), "checks")), CHECKS)
 
 
 def _tree(path: Path, content: bytes) -> YamlTree:
@@ -499,13 +499,13 @@ def _own_names(path: Path, tree: YamlTree, key: str) -> tuple[str, ...]:
         text = f"expected {expected}, found"
         places = [tree.at((key, n) if (key, n) in tree.values else (key,)) for n, _ in wrong]
         _refuse(
-            path, [place.mistake(f"{text} `{shown(name)}`") for place, (_, name) in zip(places, wrong, strict=True)]
+            path, [place.mistake(f"{text} `{printable(name)}`") for place, (_, name) in zip(places, wrong, strict=True)]
         )
     return names
 
 
 def _content(path: Path) -> bytes:
-    where = shown(str(path), 500)
+    where = printable(str(path), 500)
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
@@ -532,7 +532,7 @@ def _not_utf8(content: bytes, error: UnicodeDecodeError) -> Mistake:
 
 def _refuse(path: Path, mistakes: Iterable[Mistake]) -> NoReturn:
     """Raise an error that lists mistakes, one per line; with several, each hint names the one it belongs to."""
-    raise RubricMistakes(shown(str(path), 500), mistakes)
+    raise RubricMistakes(printable(str(path), 500), mistakes)
 
 
 def _validated(path: Path, tree: YamlTree, model: type[_Model]) -> _Model:
@@ -551,10 +551,10 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
     for index, shape in enumerate(rubric.criteria):
         name, parameters = shape.check.chosen
         try:
-            check: Check = build(parameters)
+            check: Check = plain_value(parameters)
         except ValueError as error:
             where = tree.keys[("criteria", index, "check", name)]
-            mistakes.append(where.mistake(f"invalid parameters for the check `{name}`: {shown(str(error), 200)}"))
+            mistakes.append(where.mistake(f"invalid parameters for the check `{name}`: {printable(str(error), 200)}"))
             continue
         yield Criterion(
             id=shape.id,
@@ -572,7 +572,7 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
 
 def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mapping[str, str]) -> Scenario:
     run: tuple[tuple[str, RunOptions], ...] = tuple(
-        (name, build(shape.run[name])) for name in shape.processes if name in shape.run
+        (name, plain_value(shape.run[name])) for name in shape.processes if name in shape.run
     )
     named = {*shape.processes, *(options.parameters_file for _, options in run)}
     # A launch file may name any of them
@@ -580,11 +580,11 @@ def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mappin
     return Scenario(
         id=shape.id,
         processes=shape.processes,
-        span=build(shape.observe),
-        stimuli=tuple(build(stimulus).beside(str(path.parent)) for stimulus in shape.stimuli),
-        connections=build(shape.connections),
+        span=plain_value(shape.observe),
+        stimuli=tuple(plain_value(stimulus).beside(str(path.parent)) for stimulus in shape.stimuli),
+        connections=plain_value(shape.connections),
         limits=limits,
-        starts_ns=tuple((name, build(shape.start[name])) for name in shape.processes if name in shape.start),
+        starts_ns=tuple((name, plain_value(shape.start[name])) for name in shape.processes if name in shape.start),
         may_exit=shape.may_exit,
         shutdown_ns=shape.shutdown or 0,
         run=run,

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, nearest_position, read_yaml
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 __all__ = [
     "Mistake",
@@ -20,7 +20,7 @@ __all__ = [
     "YamlTree",
     "found",
     "mistakes_of",
-    "nearest",
+    "nearest_hint",
     "read_yaml",
 ]
 
@@ -42,7 +42,7 @@ _EXPECTED: Mapping[str, str] = {
 }
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
+def nearest_hint(word: str, known: Iterable[str]) -> str:
     """Return a hint with the known word nearest to an unknown one; empty if none is near."""
     by_folded = {name.casefold(): name for name in known}
     near = difflib.get_close_matches(word.casefold(), list(by_folded), n=1, cutoff=0.6)
@@ -54,12 +54,12 @@ def found(value: object) -> str:
     if value is None or value in ("", [], {}):
         return "nothing"
     if isinstance(value, dict):
-        return f"a mapping with {listed([f'`{shown(str(key), 30)}`' for key in list(value)[:3]], 'and')}"
+        return f"a mapping with {listed([f'`{printable(str(key), 30)}`' for key in list(value)[:3]], 'and')}"
     if isinstance(value, list):
         return f"a list of {len(value)}"
     if isinstance(value, str):
-        return f"`{shown(value, 60)}`"
-    return f"`{json.dumps(value)}`" if isinstance(value, (bool, int, float)) else f"`{shown(str(value), 60)}`"
+        return f"`{printable(value, 60)}`"
+    return f"`{json.dumps(value)}`" if isinstance(value, (bool, int, float)) else f"`{printable(str(value), 60)}`"
 
 
 def mistakes_of(error: ValidationError, tree: YamlTree, model: type[BaseModel]) -> list[Mistake]:
@@ -85,8 +85,8 @@ def _mistake(one: ErrorDetails, tree: YamlTree, model: type[BaseModel]) -> Mista
     if kind == "extra_forbidden":
         keys = _keys(model, path[:-1])
         expected = listed([f"`{key}`" for key in keys]) if keys else "no such key"
-        text = f"expected {expected}{_inside(path[:-1])}, found `{shown(name)}`"
-        return tree.keys.get(path, where).mistake(text, nearest(name, keys))
+        text = f"expected {expected}{_inside(path[:-1])}, found `{printable(name)}`"
+        return tree.keys.get(path, where).mistake(text, nearest_hint(name, keys))
     if kind == "literal_error":
         options = str(one["ctx"]["expected"]).replace("'", "`")
         return where.mistake(f"expected {options}, found {found(one['input'])}")
@@ -97,7 +97,7 @@ def _mistake(one: ErrorDetails, tree: YamlTree, model: type[BaseModel]) -> Mista
 
 def _inside(path: TreePath) -> str:
     names = [part for part in path if isinstance(part, str)]
-    return f" in `{shown(names[-1], 40)}`" if names else ""
+    return f" in `{printable(names[-1], 40)}`" if names else ""
 
 
 def _keys(model: type[BaseModel], path: TreePath) -> list[str]:

@@ -18,7 +18,7 @@ from grader.grading.rubrics.drawing import (
     TransitionShape,
     list_of,
 )
-from grader.grading.rubrics.mistakes import nearest
+from grader.grading.rubrics.mistakes import nearest_hint
 from grader.grading.rubrics.own_checks import OwnSimulation
 from grader.grading.rubrics.run_options import RunShape
 from grader.grading.rubrics.types import (
@@ -96,7 +96,7 @@ else:
 def _shows(value: object) -> str:
     words = [shows.value for shows in ORDER]
     if not isinstance(value, str) or value not in words:
-        raise wrong(listed(words), nearest(value, words) if isinstance(value, str) else "")
+        raise wrong(listed(words), nearest_hint(value, words) if isinstance(value, str) else "")
     return value
 
 

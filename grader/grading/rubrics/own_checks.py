@@ -18,13 +18,13 @@ from typing import Any
 from grader.grading.model.exercise import Outcome, ProblemKind
 from grader.grading.rubrics.author_modules import OwnHints, module_of, rules_in
 from grader.grading.rubrics.check_parameters import choice_model, simulation_shape
-from grader.grading.rubrics.mistakes import nearest
+from grader.grading.rubrics.mistakes import nearest_hint
 from grader.grading.rubrics.types import BESIDE
 from grader.runtime.interfaces.definitions import files_in
-from grader.runtime.model.author_files import line_of, words_of
+from grader.runtime.model.author_files import error_words, line_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.simulation import SIMULATIONS, Simulation, loading
 
 #: Largest file of checks, in bytes.
@@ -76,8 +76,8 @@ def own_files(
         RubricError: A file is missing, too large, neither in the rubric's folder nor below, or in one of the folders
             `never_in`, which students write to.
     """
-    where = f"{shown(str(rubric), 500)}: {key}:"
-    return tuple(_own_file(rubric, name, never_in, f"{where} {shown(name)}") for name in dict.fromkeys(names))
+    where = f"{printable(str(rubric), 500)}: {key}:"
+    return tuple(_own_file(rubric, name, never_in, f"{where} {printable(name)}") for name in dict.fromkeys(names))
 
 
 def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
@@ -89,12 +89,12 @@ def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Pa
     found: list[OwnFile] = []
     for folder in dict.fromkeys(folders):
         paths = files_in([rubric.parent / folder])
-        where = f"{shown(str(rubric), 500)}: interfaces:"
+        where = f"{printable(str(rubric), 500)}: interfaces:"
         if not 0 < len(paths) <= MOST_DEFINITIONS:
-            text = f"{where} {shown(folder)}: expected a folder with 1 to {MOST_DEFINITIONS} definitions, found "
+            text = f"{where} {printable(folder)}: expected a folder with 1 to {MOST_DEFINITIONS} definitions, found "
             raise RubricError(f"{text}{len(paths) or 'none'}", "a package has its files in folders msg, srv and action")
         names = [path.relative_to(rubric.parent).as_posix() for path in paths]
-        found += [_own_file(rubric, name, never_in, f"{where} {shown(name)}", least=0) for name in names]
+        found += [_own_file(rubric, name, never_in, f"{where} {printable(name)}", least=0) for name in names]
     return tuple(found)
 
 
@@ -106,7 +106,7 @@ def bag_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ())
     """
     found: list[OwnFile] = []
     for name in dict.fromkeys(names):
-        path, where = rubric.parent / name, f"{shown(str(rubric), 500)}: recorded: {shown(name)}"
+        path, where = rubric.parent / name, f"{printable(str(rubric), 500)}: recorded: {printable(name)}"
         files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
         if not 0 < len(files) <= MOST_BAG_FILES:
             text = f"{where}: expected a recording of 1 to {MOST_BAG_FILES} files, found {len(files) or 'none'}"
@@ -136,7 +136,7 @@ def named_files(data: object, key: str) -> tuple[str, ...]:
     return tuple(name for name in names if isinstance(name, str)) if isinstance(names, list) else ()
 
 
-def load(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]:
+def load_checks(files: Sequence[OwnFile], known: Mapping[str, type]) -> dict[str, type]:
     """Run check files, and return their checks by name, none of which is in `known`; raises RubricError."""
     found: dict[str, type] = {}
     for file in files:
@@ -178,14 +178,14 @@ def load_hints(files: Sequence[OwnFile], known: Mapping[str, type]) -> OwnHints:
     taken = {rule.id for rule in RULES}
     problems: list[str] = []
     for file in files:
-        rules, where = _ran(file, lambda f: rules_in(*_told(f))), shown(str(file.path), 500)
+        rules, where = _ran(file, lambda f: rules_in(*_told(f))), printable(str(file.path), 500)
         if not rules:
             text = f"{where}:1: expected hint rules, which are functions with @hint_rule(...) above them, found none"
             raise RubricError(text)
         for rule in rules:
             wrong = "expected a new name, found one that is taken" if rule.id in taken else _no_rule(rule, known)
             line = getattr(getattr(rule.function, "__code__", None), "co_firstlineno", 1)
-            problems += [f"{where}:{line}: `{shown(rule.id)}`: {wrong}"] if wrong else []
+            problems += [f"{where}:{line}: `{printable(rule.id)}`: {wrong}"] if wrong else []
             taken.add(rule.id)
     if problems:
         raise RubricError("\n".join(problems))
@@ -201,8 +201,8 @@ def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
     """Return why a rule cannot be asked; empty if it can."""
     unknown = next((name for name in rule.checks if isinstance(name, str) and name not in known), None)
     if unknown is not None:
-        near = nearest(unknown, known)
-        return f"expected the name of a check, found `{shown(unknown)}`{f'; {near}' if near else ''}"
+        near = nearest_hint(unknown, known)
+        return f"expected the name of a check, found `{printable(unknown)}`{f'; {near}' if near else ''}"
     parts = (
         ("priority", isinstance(rule.priority, int) and not isinstance(rule.priority, bool), "a whole number"),
         ("problem", isinstance(rule.problem, (ProblemKind, type(None))), "a ProblemKind"),
@@ -211,7 +211,7 @@ def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
     )
     for name, right, expected in parts:
         if not right:
-            return f"expected {expected} as {name}, found {shown(repr(getattr(rule, name)))}"
+            return f"expected {expected} as {name}, found {printable(repr(getattr(rule, name)))}"
     try:
         inspect.signature(rule.function).bind(None)
     except (TypeError, ValueError):
@@ -219,7 +219,7 @@ def _no_rule(rule: Any, known: Mapping[str, type]) -> str:
     return ""
 
 
-def digest_of(rubric: bytes, files: Sequence[OwnFile]) -> str:
+def rubric_digest(rubric: bytes, files: Sequence[OwnFile]) -> str:
     """Return the `sha256:` digest of a rubric and the files it brings; without such files, that of the rubric alone."""
     digest = hashlib.sha256(rubric)
     for file in files:
@@ -243,7 +243,7 @@ def _own_file(  # noqa: PLR0913  what to read, and its limits
     if not inside:
         raise RubricError(f"{where}: expected a file in the rubric's folder, found one that is not")
     if theirs:
-        text = f"{where}: expected a file that students cannot write, found one in {shown(str(theirs[0]))}"
+        text = f"{where}: expected a file that students cannot write, found one in {printable(str(theirs[0]))}"
         raise RubricError(text, "keep rubrics and what they bring apart from submissions")
     if not least <= len(content) or (not content and real.stat().st_size):
         raise RubricError(f"{where}: expected {least} byte to {most // 1024} KiB, found none or more")
@@ -256,14 +256,14 @@ def _ran(file: OwnFile, run_: Callable[[OwnFile], Any]) -> Any:
         return run_(file)
     except (Exception, SystemExit) as error:  # whatever the author's file raises, the author has to fix
         line = max(line_of(error, str(file.path.resolve())), line_of(error, file.name))
-        text = f"{shown(str(file.path), 500)}:{line}: expected a file that can be imported, found "
-        text += f"{type(error).__name__}: {shown(words_of(error), 200)}"
+        text = f"{printable(str(file.path), 500)}:{line}: expected a file that can be imported, found "
+        text += f"{type(error).__name__}: {printable(error_words(error), 200)}"
         raise RubricError(text, _ALONE if isinstance(error, ImportError) else "") from None
 
 
 def _table(file: OwnFile, name: str, ran: Callable[[OwnFile], object]) -> dict[str, Any]:
     """Run a file and return its table; raises RubricError with the line that failed."""
-    where, table = shown(str(file.path), 500), _ran(file, ran)
+    where, table = printable(str(file.path), 500), _ran(file, ran)
     if not isinstance(table, dict) or not table:
         found = "none" if table is None else "an empty one" if table == {} else f"a {type(table).__name__}"
         raise RubricError(f'{where}:1: expected a table {name} = {{"name": Class}}, found {found}')
@@ -274,13 +274,13 @@ def _problems(
     file: OwnFile, table: Mapping[str, object], taken: Mapping[str, object], unfit: Callable[[object], str]
 ) -> Iterator[str]:
     """Yield what makes the entries of a table unfit, each with its place."""
-    where = shown(str(file.path), 500)
+    where = printable(str(file.path), 500)
     lines = _lines(file.content)
     for name, kind in table.items():
         line = lines.get(f"key {name}", 1)
         if not isinstance(name, str) or _ID.fullmatch(name) is None:
             wrong = "expected a name of lower-case letters, digits and _, starting with a letter"
-            yield f"{where}:{line}: {wrong}, found `{shown(str(name))}`"
+            yield f"{where}:{line}: {wrong}, found `{printable(str(name))}`"
         elif name in taken:
             yield f"{where}:{line}: expected a new name, found `{name}`, which is taken"
         elif wrong := unfit(kind):
@@ -315,7 +315,7 @@ def _no_parameters(make: Callable[[], object]) -> str:
     try:
         make()
     except Exception as error:  # an annotation may be anything, and may name something undefined
-        return f"expected parameters that a rubric can hold, found {type(error).__name__}: {shown(str(error), 200)}"
+        return f"expected parameters that a rubric can hold, found {type(error).__name__}: {printable(str(error), 200)}"
     return ""
 
 

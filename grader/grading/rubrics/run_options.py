@@ -11,7 +11,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 
 from grader.grading.rubrics.types import MatchingText, Shape, wrong
 from grader.runtime.model.scenario import RunOptions
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 _NODE = r"[A-Za-z_][A-Za-z0-9_]*"
 _ROS = r"[~/A-Za-z_][A-Za-z0-9_/]*"
@@ -34,10 +34,10 @@ def parameter_value(name: str, value: object) -> str:
             value, kinds = [float(item) for item in value], {float}
         if len(kinds) == 1:
             return f"[{', '.join(_scalar(item) for item in value)}]"
-        raise wrong(f"values of one type in the list `{shown(name, 40)}`")
+        raise wrong(f"values of one type in the list `{printable(name, 40)}`")
     if isinstance(value, (bool, int, float, str)):
         return _scalar(value)
-    raise wrong(f"{_VALUES} as `{shown(name, 40)}`")
+    raise wrong(f"{_VALUES} as `{printable(name, 40)}`")
 
 
 def _scalar(value: Scalar) -> str:
@@ -64,7 +64,7 @@ def _parameters(value: object) -> dict[str, str]:
     found = dict(flat(value))
     odd = next((name for name in found if not all(c.isalnum() or c in "_.-" for c in name)), None)
     if odd is not None:
-        raise wrong(f"a parameter's name of letters, digits, `_` and `.`, not {shown(odd, 40)}")
+        raise wrong(f"a parameter's name of letters, digits, `_` and `.`, not {printable(odd, 40)}")
     return found
 
 

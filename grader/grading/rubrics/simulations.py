@@ -10,14 +10,14 @@ from itertools import islice
 from typing import Any
 
 from grader.grading.rubrics.model import RubricShape, ScenarioShape
-from grader.grading.rubrics.types import build
+from grader.grading.rubrics.types import plain_value
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.scenario import Between, Choose, FieldSpec, Stimulus, Written
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 from grader.runtime.simulation import SHORTEST_PERIOD_NS, Moment, Output, types_heard
-from grader.runtime.simulation.loading import begin_of, guarded, made
+from grader.runtime.simulation.loading import begin_of, guarded, made_simulation
 from grader.runtime.stimuli import Simulated
 
 #: How many steps and messages of a step are tried.
@@ -51,13 +51,13 @@ def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
         for number, shape in enumerate(scenario.stimuli):
             if shape.chosen[0] == Simulated.key:
                 chosen = shape.chosen[1]
-                yield ("scenarios", index, "stimuli", number, Simulated.key, chosen.chosen[0]), build(chosen)
+                yield ("scenarios", index, "stimuli", number, Simulated.key, chosen.chosen[0]), plain_value(chosen)
 
 
 def offered(simulated: Simulated) -> Offered:
     """Try a simulation with the first value that each parameter may have; raises HarnessError if it fails."""
     parameters = {name: _first(spec) for name, spec in simulated.parameters.items()}
-    one = made(simulated.name, simulated.path, simulated.content, parameters)
+    one = made_simulation(simulated.name, simulated.path, simulated.content, parameters)
     call = partial(guarded, simulated.name, simulated.path)
     call(lambda: one.begin(random.Random(0)))  # noqa: S311  the same at each reading
     if not (isinstance(one.period, int) and one.period >= SHORTEST_PERIOD_NS):
@@ -75,7 +75,9 @@ def offered(simulated: Simulated) -> Offered:
         outputs += call(lambda now=now: list(islice(one.step(now), OUTPUTS)), begin_of(one, "step", simulated.path))  # type: ignore[misc]
     wrong = [output for output in outputs if not _is_output(output, publishes)]
     if wrong:
-        text = f"the simulation `{simulated.name}` publishes {shown(str(wrong[0]), 80)}, expected one of its topics "
+        text = (
+            f"the simulation `{simulated.name}` publishes {printable(str(wrong[0]), 80)}, expected one of its topics "
+        )
         raise HarnessError(f"{text}({', '.join(publishes) or 'it has none'}) and a mapping of fields")
     return Offered(publishes, hears, serves, tuple(outputs))
 
@@ -128,5 +130,5 @@ def simulation_mistakes(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake
 
 def _names_of_others(scenario: ScenarioShape) -> set[str]:
     """Return the topics and services of the stimuli that are not simulations."""
-    stimuli = [build(shape) for shape in scenario.stimuli]
+    stimuli = [plain_value(shape) for shape in scenario.stimuli]
     return {getattr(s, key) for s in stimuli for key in ("topic", "service") if hasattr(s, key)}

@@ -20,7 +20,7 @@ from grader.grading.rubrics.own_checks import OwnFile
 from grader.grading.rubrics.types import read_points
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 #: Most tests in a file, with those that parametrisation makes: each is a run of its own.
 MOST_TESTS = 200
@@ -57,27 +57,26 @@ class _MistakeError(Exception):
 
 def tests_in(file: OwnFile) -> tuple[AuthoredTest, ...]:
     """Return the tests of a file in its order; raises RubricError with every mistake, each with its line."""
-    where = shown(str(file.path), 500)
+    where = printable(str(file.path), 500)
     try:
         tree = ast.parse(file.content)
     except (SyntaxError, ValueError, RecursionError) as error:
         text = f"{where}:{getattr(error, 'lineno', None) or 1}: expected Python, found {type(error).__name__}"
-        raise RubricError(f"{text}: {shown(str(getattr(error, 'msg', error)), 200)}") from None
+        raise RubricError(f"{text}: {printable(str(getattr(error, 'msg', error)), 200)}") from None
     problems: list[str] = []
     found: list[AuthoredTest] = []
     for holder, function in _functions(tree, problems, where):
         try:
             found += _tests(holder, function)
         except _MistakeError as mistake:
-            problems.append(f"{where}:{mistake.line}: `{shown(function.name)}`: {mistake}")
+            problems.append(f"{where}:{mistake.line}: `{printable(function.name)}`: {mistake}")
     known: dict[str, AuthoredTest] = {}
     for test in found:
         other = known.setdefault(test.id, test)
         if other is not test:
-            text = (
-                f"expected tests with different ids, found `{test.id}` for {shown(other.name)}, line {other.line}, too"
-            )
-            problems.append(f"{where}:{test.line}: `{shown(test.name)}`: {text}")
+            text = f"expected tests with different ids, found `{test.id}` for {printable(other.name)}, "
+            text += f"line {other.line}, too"
+            problems.append(f"{where}:{test.line}: `{printable(test.name)}`: {text}")
     if not found and not problems:
         problems.append(f"{where}:1: expected tests, which are functions whose names begin with test_, found none")
     if len(found) > MOST_TESTS:
@@ -93,7 +92,7 @@ def _functions(
     """Yield the test functions with their class; what pytest would collect in another way is a problem."""
     holders = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name.startswith("Test")]
     problems += [
-        f"{where}:{holder.lineno}: `{shown(holder.name)}`: expected a class of tests without bases"
+        f"{where}:{holder.lineno}: `{printable(holder.name)}`: expected a class of tests without bases"
         for holder in holders
         if holder.bases
     ]
@@ -105,7 +104,7 @@ def _functions(
     for holder, body in ((None, tree.body), *((holder, holder.body) for holder in holders if not holder.bases)):
         for node in body:
             if isinstance(node, ast.AsyncFunctionDef) and node.name.startswith("test"):
-                problems.append(f"{where}:{node.lineno}: `{shown(node.name)}`: expected `def`, found `async def`")
+                problems.append(f"{where}:{node.lineno}: `{printable(node.name)}`: expected `def`, found `async def`")
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test"):
                 yield holder, node
 
@@ -171,7 +170,9 @@ def _literal(node: ast.expr, expected: str) -> Any:
     try:
         return ast.literal_eval(node)
     except (ValueError, TypeError, SyntaxError, RecursionError, MemoryError):
-        raise _MistakeError(node, f"expected {expected}, written out, found {shown(ast.unparse(node), 60)}") from None
+        raise _MistakeError(
+            node, f"expected {expected}, written out, found {printable(ast.unparse(node), 60)}"
+        ) from None
 
 
 def _cases(node: ast.expr) -> Sequence[tuple[str, ast.expr | None]]:
@@ -196,7 +197,7 @@ def _cases(node: ast.expr) -> Sequence[tuple[str, ast.expr | None]]:
     repeated = [id_ for n, (id_, _) in enumerate(found) if id_ in [other for other, _ in found[:n]]]
     if repeated:
         raise _MistakeError(
-            node, f"expected values with different ids, found `{shown(repeated[0])}` again: give them ids"
+            node, f"expected values with different ids, found `{printable(repeated[0])}` again: give them ids"
         )
     if not found:
         raise _MistakeError(node, "expected at least one value")
@@ -237,6 +238,6 @@ def _plain(text: str, node: ast.expr) -> str:
     """Return a text that pytest writes in ids as it is; raises _MistakeError for one that it would escape."""
     if not (text.isascii() and text.isprintable() and "\\" not in text and text):
         raise _MistakeError(
-            node, f"expected an id of printable ASCII characters, found {shown(text, 60)}: give it another"
+            node, f"expected an id of printable ASCII characters, found {printable(text, 60)}: give it another"
         )
     return text

@@ -75,16 +75,16 @@ class Choice(Shape):
 
     def built(self) -> Any:
         """Return the value for an exercise that the chosen key stands for."""
-        return build(self.chosen[1])
+        return plain_value(self.chosen[1])
 
 
-def build(value: object) -> Any:
+def plain_value(value: object) -> Any:
     """Return a validated value, and everything inside it, as values for an exercise."""
     if isinstance(value, Shape):
         return value.built()
     if isinstance(value, dict):
-        return {key: build(item) for key, item in value.items()}
-    return tuple(map(build, value)) if isinstance(value, tuple) else value
+        return {key: plain_value(item) for key, item in value.items()}
+    return tuple(map(plain_value, value)) if isinstance(value, tuple) else value
 
 
 @dataclass(frozen=True, slots=True)

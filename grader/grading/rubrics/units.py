@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import GIB, KIB, MIB, NS_PER_MS, NS_PER_S, Unit
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 
 class QuantityError(ValueError):
@@ -107,14 +107,14 @@ def parse_quantity(text: str, unit: Unit) -> int | float:
 def _unknown_unit(number: str, written: str, kind: _Kind) -> QuantityError:
     known = {name.casefold(): name for name in kind.units} | dict(kind.spellings)
     nearest = known.get(written.casefold())
-    hint = f"write `{shown(number, 30)} {nearest}`" if nearest else ""
+    hint = f"write `{printable(number, 30)} {nearest}`" if nearest else ""
     return QuantityError(f"{kind.noun} in {listed(list(kind.units))}", hint)
 
 
 def missing_unit(number: str, symbol: str) -> QuantityError:
     """Return the error for a bare number where a quantity in `symbol` is expected."""
     kind = _KINDS[symbol]
-    number = shown(number, 30)
+    number = printable(number, 30)
     return QuantityError(
         f"{kind.noun} with its unit, such as `{kind.example}`",
         f"write {listed([f'`{number} {name}`' for name in kind.usual])}",

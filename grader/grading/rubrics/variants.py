@@ -14,11 +14,11 @@ from typing import Annotated, Self
 from pydantic import ConfigDict, PlainValidator, WithJsonSchema, model_validator
 
 from grader.grading.model.exercise import Value, Variant
-from grader.grading.rubrics.mistakes import nearest
+from grader.grading.rubrics.mistakes import nearest_hint
 from grader.grading.rubrics.types import Id, Shape, must, wrong
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlTree
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 #: Key of a placeholder for a value: `{variant: rate}`.
 REFERENCE = "variant"
@@ -190,9 +190,11 @@ def _misuse(name: str, path: TreePath, known: Mapping[str, Value], tree: YamlTre
     where = tree.at(path)
     if name not in known:
         names = listed([f"`{one}`" for one in known])
-        yield where.mistake(f"expected one of `variants` ({names}), found `{shown(name)}`", nearest(name, known))
+        yield where.mistake(
+            f"expected one of `variants` ({names}), found `{printable(name)}`", nearest_hint(name, known)
+        )
     elif not _may_vary(path):
-        text = f"expected a value of its own here, found the variant `{shown(name)}`"
+        text = f"expected a value of its own here, found the variant `{printable(name)}`"
         yield where.mistake(text, "variants belong in scenarios, checks, titles and hints")
 
 

@@ -13,7 +13,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 #: Deepest nesting, and most values after expanding aliases: a small file can expand to billions of values.
 MAX_DEPTH = 24
@@ -97,7 +97,7 @@ def read_yaml(text: str) -> YamlTree:
         raise YamlSyntaxError(_syntax_mistake(error)) from None
     except (YAMLError, ValueError, LookupError, AttributeError, AssertionError) as error:
         # The parser lets some of its own exceptions escape on malformed directives and escapes.
-        raise YamlSyntaxError(TOP.mistake(f"not valid YAML: {shown(str(error))}")) from None
+        raise YamlSyntaxError(TOP.mistake(f"not valid YAML: {printable(str(error))}")) from None
     tree = YamlTree()
     if root is not None:
         tree.data = _Reader(tree).value(root, ())
@@ -126,7 +126,7 @@ def _position(mark: StreamMark | None) -> Position:
 
 
 def _unreadable_character(text: str, error: ReaderError) -> Mistake:
-    character = shown(text[error.position : error.position + 1])
+    character = printable(text[error.position : error.position + 1])
     return end_of(text[: error.position]).mistake(f"expected text, found the control character {character}")
 
 
@@ -135,7 +135,7 @@ def _syntax_mistake(error: MarkedYAMLError) -> Mistake:
     problem = str(error.problem or error.context)
     if problem.startswith("but "):
         problem = f"{error.context}, {problem}"
-    problem = shown(" ".join(problem.split()), 160)
+    problem = printable(" ".join(problem.split()), 160)
     hint = "indent with spaces, not with tabs" if "\\t" in problem else ""
     return where.mistake(f"not valid YAML: {problem}", hint)
 
@@ -171,7 +171,7 @@ class _Reader:
             key = str(key_node.value)
             if key in found:
                 first = self._tree.keys[(*path, key)].line
-                text = f"expected each key once, found `{shown(key)}` again (first in line {first})"
+                text = f"expected each key once, found `{printable(key)}` again (first in line {first})"
                 self._tree.mistakes.append(where.mistake(text))
                 continue
             self._tree.keys[(*path, key)] = where
@@ -184,14 +184,14 @@ class _Reader:
         where = _position(node.start_mark)
         tag = re.sub(r"^tag:yaml\.org,2002:", "!!", str(node.tag))
         if tag not in _PLAIN_TAGS:
-            self._tree.mistakes.append(where.mistake(f"expected a plain value, found the tag {shown(tag)}"))
+            self._tree.mistakes.append(where.mistake(f"expected a plain value, found the tag {printable(tag)}"))
             return str(node.value)
         if tag in _TEXT_TAGS:
             return str(node.value)
         try:
             return self._construct(node)
         except (YAMLError, ValueError, KeyError, OverflowError):
-            text = f"expected a value of the kind {tag}, found `{shown(str(node.value))}`"
+            text = f"expected a value of the kind {tag}, found `{printable(str(node.value))}`"
             self._tree.mistakes.append(where.mistake(text))
             return str(node.value)
 

@@ -26,7 +26,7 @@ from grader.grading.submissions.collected import (
     is_skipped,
     name_problem,
 )
-from grader.grading.submissions.foreign_archives import KINDS, UnpackerLimits, foreign_members, is_installed
+from grader.grading.submissions.foreign_archives import KINDS, UnpackerLimits, foreign_members, has_libarchive
 from grader.grading.submissions.members import FEWER, FILE, FOLDER, LINK, REPACK, Member, UnusableArchiveError
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.limits import (
@@ -37,7 +37,7 @@ from grader.runtime.model.limits import (
     MAX_XZ_BYTES,
     RATIO_FREE_BYTES,
 )
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 __all__ = [
     "ARCHIVE_SUFFIXES",
@@ -323,7 +323,7 @@ def _members(data: bytes, limits: SubmissionLimits) -> list[Member]:
     allowed = _allowed(len(data))
     limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
     total = min(MAX_UNPACKED_BYTES, allowed)
-    if kind in KINDS and is_installed():
+    if kind in KINDS and has_libarchive():
         return foreign_members(data, kind, UnpackerLimits(limits.entries, limits.file_bytes, total, limit))
     if kind not in _READABLE:
         hint = (
@@ -354,12 +354,12 @@ def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
             continue
         problem = name_problem(name)
         if problem:
-            raise UnusableArchiveError(f"expected plain relative names, found {problem}: {shown(member.name)}")
+            raise UnusableArchiveError(f"expected plain relative names, found {problem}: {printable(member.name)}")
         if member.kind == FOLDER or is_skipped(name):
             continue
         if member.kind != FILE:
             hint = "replace it by the file itself" if member.kind == LINK else REPACK
-            raise UnusableArchiveError(f"expected plain files, found {member.kind}: {shown(member.name)}", hint)
+            raise UnusableArchiveError(f"expected plain files, found {member.kind}: {printable(member.name)}", hint)
         yield name, member
 
 
@@ -390,7 +390,11 @@ def _without_generated(
         raise _too_many(limits.depth, "folders inside each other")
     twins = collision([name for name, _ in kept])
     if twins is not None:
-        found = f"found {shown(twins[0])} and {shown(twins[1])}" if twins[0] != twins[1] else f"found {shown(twins[0])}"
+        found = (
+            f"found {printable(twins[0])} and {printable(twins[1])}"
+            if twins[0] != twins[1]
+            else f"found {printable(twins[0])}"
+        )
         raise UnusableArchiveError(f"expected different names, {found}{' twice' if twins[0] == twins[1] else ''}")
     return kept
 

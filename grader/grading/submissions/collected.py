@@ -19,7 +19,7 @@ from grader.runtime.model.limits import (
     MAX_PATH_BYTES,
     MAX_TOTAL_BYTES,
 )
-from grader.runtime.model.wording import first_of, shown
+from grader.runtime.model.wording import first_of, printable
 
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
 GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
@@ -159,7 +159,7 @@ class Collected:
 def largest_of(files: Iterable[tuple[str, bytes]]) -> str:
     """Describe the largest of some files, for somebody who has handed in too much."""
     name, content = max(files, key=lambda file: len(file[1]))
-    return f"the largest file is {shown(name, 80)}, {len(content) / (1 << 20):.1f} MiB"
+    return f"the largest file is {printable(name, 80)}, {len(content) / (1 << 20):.1f} MiB"
 
 
 @dataclass(slots=True)

@@ -110,7 +110,7 @@ class ReaderAnswer:
         return self._told[self._at - size : self._at]
 
 
-def content_of(path: Path, most: int) -> bytes | None:
+def read_within(path: Path, most: int) -> bytes | None:
     """Return the bytes of a plain file, empty if there is none; None if there are more than allowed."""
     try:
         with open(path, "rb", opener=_without_waiting) as file:
@@ -122,7 +122,7 @@ def content_of(path: Path, most: int) -> bytes | None:
     return content if len(content) <= most else None
 
 
-def first_line(path: Path, most: int) -> str:
+def beginning_of_file(path: Path, most: int) -> str:
     """Return the beginning of the first line of a plain file; empty if there is none."""
     try:
         with open(path, "rb", opener=_without_waiting) as file:

@@ -46,12 +46,12 @@ class UnpackerLimits:
     real_s: float = REAL_S
 
 
-def install_command() -> str:
+def libarchive_commands() -> str:
     """Return the commands that install libarchive here."""
     return f"{extras.install_command('libarchive-c')} && sudo apt-get install -y libarchive13"
 
 
-def is_installed() -> bool:
+def has_libarchive() -> bool:
     """Return whether the Python package and the C library are there."""
     return importlib.util.find_spec("libarchive") is not None and ctypes.util.find_library("archive") is not None
 
@@ -192,7 +192,7 @@ def _check(code: int, kind: str, limits: UnpackerLimits) -> None:
     if code == _TOO_MUCH:
         raise UnusableArchiveError(f"expected at most {limits.words}, found more", FEWER)
     if code == _NO_LIBRARY:
-        raise HarnessError(f"a {kind} archive cannot be unpacked: libarchive cannot be loaded", install_command())
+        raise HarnessError(f"a {kind} archive cannot be unpacked: libarchive cannot be loaded", libarchive_commands())
     if code:  # damaged, or killed at a limit of memory or time
         raise _unreadable(kind)
 

@@ -29,7 +29,7 @@ from grader.grading.submissions.reaching import reaching
 from grader.grading.submissions.source_encodings import BOM, UNUSUAL, USUAL, encoding_of
 from grader.runtime.model.limits import MAX_PARSED_BYTES
 from grader.runtime.programs.beginning import beginning_of
-from grader.runtime.programs.inert import is_inert, read
+from grader.runtime.programs.inert import is_inert, read_inert
 
 
 class Described(NamedTuple):
@@ -41,7 +41,7 @@ class Described(NamedTuple):
     nodes: int = 0
 
 
-def prepare(contents: Iterable[bytes]) -> frozenset[str]:
+def load_encodings(contents: Iterable[bytes]) -> frozenset[str]:
     """Load the encodings of some files, which a confined process could not; return those of this Python, by modules."""
     for encoding in {encoding_of(content) for content in contents} & (USUAL | UNUSUAL):
         codecs.lookup(encoding)
@@ -49,7 +49,7 @@ def prepare(contents: Iterable[bytes]) -> frozenset[str]:
     return frozenset(name.removesuffix(".py") for name in names) | frozenset(encodings.aliases.aliases)
 
 
-def described(  # noqa: PLR0911  one for each kind of file
+def program_description(  # noqa: PLR0911  one for each kind of file
     content: bytes, known: frozenset[str], *, decoded: bool = False
 ) -> Described:
     """Return what a file holds; reading any file, however strange, raises nothing.
@@ -69,7 +69,7 @@ def described(  # noqa: PLR0911  one for each kind of file
     parsable = len(content) <= MAX_PARSED_BYTES
     if text is not None and not parsable and len(text) > LONGEST_SOURCE:
         return Described({"reaches": [LONG_FILE, *odd], "problem": LONG}, told)
-    found = read(text if decoded and text is not None else content)
+    found = read_inert(text if decoded and text is not None else content)
     if isinstance(found, SyntaxError):
         error = [type(found).__name__, str(found.msg)[:ERROR_CHARACTERS], _line(found)]
         return Described({"reaches": [*odd], **({"error": error} if parsable else {})}, told)

@@ -33,13 +33,13 @@ ENCODINGS = ("ascii", "latin-1", "iso8859-15", "cp1252", "utf-8-sig")
 Value = TypeVar("Value")
 
 
-def prepare() -> None:
+def load_parsers() -> None:
     """Load what a confined process could not."""
     for name in ENCODINGS:
         codecs.lookup(name)
 
 
-def described(files: dict[str, bytes], names: Sequence[str]) -> dict[str, Any]:
+def project_description(files: dict[str, bytes], names: Sequence[str]) -> dict[str, Any]:
     """Return what the project files of a package say.
 
     Args:

@@ -15,8 +15,8 @@ from grader.grading.submissions.contained_reader import (
     Asked,
     ReaderAnswer,
     Tell,
-    content_of,
-    first_line,
+    beginning_of_file,
+    read_within,
     told_by_process,
 )
 from grader.runtime.model.limits import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES
@@ -106,7 +106,7 @@ class Packages:
         """Return the content of a file, empty if it is not there or too large; it is read and counted once."""
         if path in self._numbers:
             return asked.content(self._numbers[path])
-        content = content_of(path, min(MOST_BYTES, self._left))
+        content = read_within(path, min(MOST_BYTES, self._left))
         if content is None:
             self._problems["large", _relative(path, self._root)] = None
         if content:
@@ -173,7 +173,7 @@ def _with_programs(project: Project, answer: Mapping[str, Any], folder: Path) ->
         name, file, runs = row[0], _normal(row[1]), row[2]
         if not file or _SCRIPT.fullmatch(name) is None or name in (".", ".."):
             continue
-        first = first_line(folder / file, _START_BYTES)
+        first = beginning_of_file(folder / file, _START_BYTES)
         if first.startswith("#!") and "python" not in first:
             foreign.append(name)
         elif file.endswith(".py") or first.startswith("#!"):

@@ -20,7 +20,7 @@ from grader.grading.submissions.answers import (
     NAME_CHARACTERS,
     UNREADABLE,
 )
-from grader.grading.submissions.contained_reader import Asked, ReaderAnswer, Tell, content_of, told_by_process
+from grader.grading.submissions.contained_reader import Asked, ReaderAnswer, Tell, read_within, told_by_process
 from grader.runtime.model.limits import MAX_PROGRAM_BYTES, MAX_SOURCE_BYTES
 from grader.runtime.model.submission import Beginning, CompileError, ReadProgram, SourceText, Submission
 from grader.runtime.model.wording import first_of
@@ -63,7 +63,7 @@ class Programs:
         files = ((path.relative_to(self._root).as_posix(), path) for path in self._root.rglob("*") if path.is_file())
         wanted = {path: file for path, file in files if file.suffix == ".py" or self._is_likely(path)}
         for path in sorted(wanted, key=lambda path: (not self._is_likely(path), path)):
-            content = content_of(wanted[path], min(MAX_SOURCE_BYTES, left))
+            content = read_within(wanted[path], min(MAX_SOURCE_BYTES, left))
             if content is None:
                 self._problems[LONG, path] = None
                 self._found[path] = _UNTOLD
@@ -176,7 +176,7 @@ def read_files(submission: Submission, paths: Iterable[str], tell: Tell = told_b
     missing = [path for path in named if path not in known and (submission.root / path).is_file()]
     if missing:
         asked = Asked(likely=missing)
-        contents = {path: content_of(submission.root / path, MAX_SOURCE_BYTES) for path in missing}
+        contents = {path: read_within(submission.root / path, MAX_SOURCE_BYTES) for path in missing}
         kept = {path: content for path, content in contents.items() if content is not None}
         asked.programs += [(path, asked.add(content)) for path, content in kept.items()]
         answer = ReaderAnswer(tell(asked.input()) if kept else b"")

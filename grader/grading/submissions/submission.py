@@ -19,7 +19,7 @@ from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.limits import MAX_ARCHIVE_BYTES, MAX_FILE_BYTES
 from grader.runtime.model.projects import Project
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
-from grader.runtime.model.wording import first_of, listed, shown
+from grader.runtime.model.wording import first_of, listed, printable
 from grader.runtime.programs.executables import Executable, executables, find_executables
 
 __all__ = [
@@ -76,7 +76,7 @@ def stage_submission(
 
 def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collected:
     """Read a submission without writing anything; arguments and errors are those of `stage_submission`."""
-    where = shown(path, 500)
+    where = printable(path, 500)
     source = Path(path)
     if stat.S_ISDIR(_mode(path, where)):
         return _with_python(collect_folder(source, into=into, where=where), wanted, where)
@@ -88,7 +88,7 @@ def every_file(path: str, into: Path) -> Collected:
 
     Errors are those of `stage_submission`, but for a missing .py file.
     """
-    where, source = shown(path, 500), Path(path)
+    where, source = printable(path, 500), Path(path)
     folder = stat.S_ISDIR(_mode(path, where))
     collected = collect_folder(source, into=into, where=where) if folder else _every_file_of(source, (), where)
     if _has_python(name for name, _ in collected.files):
@@ -99,7 +99,7 @@ def every_file(path: str, into: Path) -> Collected:
     if len(archives) != 1:
         return collected
     name, packed = archives[0]
-    return collect_archive(packed, where=f"{where}/{shown(name)}")
+    return collect_archive(packed, where=f"{where}/{printable(name)}")
 
 
 def stage_collected(
@@ -152,7 +152,7 @@ def _mode(path: str, where: str) -> int:
 
 def not_there(path: str, hint: str = "") -> SubmissionError:
     """Return the error for a path at which there is nothing."""
-    text = f"{shown(path, 500)}: expected {_EXPECTED}, found nothing there"
+    text = f"{printable(path, 500)}: expected {_EXPECTED}, found nothing there"
     return SubmissionError(text, hint or "check the path, and the folder you are in")
 
 
@@ -193,9 +193,9 @@ def _archives(collected: Collected) -> list[tuple[str, bytes]]:
 def _other_kind(source: Path, wanted: Sequence[str]) -> str:
     """Return a hint for a file that is neither a program nor an archive: a notebook, or a program of another name."""
     if is_notebook(source.name):
-        return f"{shown(source.name)} is a notebook: {EXPORT_NOTEBOOK}"
+        return f"{printable(source.name)} is a notebook: {EXPORT_NOTEBOOK}"
     if any(_similar(name, [source.name], wanted) for name in wanted) or ".py" in source.suffixes:
-        return f"rename {shown(source.name)} so that it ends in .py"
+        return f"rename {printable(source.name)} so that it ends in .py"
     return ""
 
 
@@ -210,11 +210,11 @@ def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Col
     if len(archives) != 1:
         raise _no_python(collected, wanted, where)
     name, packed = archives[0]
-    inside = f"{where.rstrip('/')}/{shown(name)}"
+    inside = f"{where.rstrip('/')}/{printable(name)}"
     inner = collect_archive(packed, where=inside)
     if not _has_python(name for name, _ in inner.files):
         raise _no_python(inner, wanted, inside)
-    return Collected(inner.files, (f"the contents of {shown(name)} were graded", *collected.notes, *inner.notes))
+    return Collected(inner.files, (f"the contents of {printable(name)} were graded", *collected.notes, *inner.notes))
 
 
 def _has_python(names: Iterable[str]) -> bool:
@@ -228,16 +228,20 @@ def _no_python(collected: Collected, wanted: Sequence[str], where: str) -> Submi
     hint = ""
     notebooks = [name for name in names if is_notebook(name)]
     if notebooks:
-        hint = f"{shown(notebooks[0])} is a notebook: {EXPORT_NOTEBOOK}"
+        hint = f"{printable(notebooks[0])} is a notebook: {EXPORT_NOTEBOOK}"
     elif similar:
-        hint = f"rename {shown(similar[0])} so that it ends in .py"
+        hint = f"rename {printable(similar[0])} so that it ends in .py"
     elif archives:
         one = "put your .py files into one zip"
-        hint = f"{one}, not into several" if len(archives) > 1 else f"{one}: {shown(archives[0])} is inside another one"
+        hint = (
+            f"{one}, not into several"
+            if len(archives) > 1
+            else f"{one}: {printable(archives[0])} is inside another one"
+        )
     elif collected.notes:
         hint = collected.notes[0]
     elif wanted:
-        hint = f"hand in {listed([shown(name) for name in wanted][:_MOST_WANTED])}"
+        hint = f"hand in {listed([printable(name) for name in wanted][:_MOST_WANTED])}"
     found = f"{len(archives)} archives" if len(archives) > 1 else first_of(names) if names else "none"
     return SubmissionError(f"{where}: expected at least one .py file, found {found}", hint)
 
@@ -274,7 +278,7 @@ def _unrunnable(files: Iterable[StudentFile], projects: Sequence[Project]) -> It
     known = {f"{project.folder}/{file}".lstrip("/") for project in projects for _, file in project.unrunnable}
     for file in files:
         if "/" in file.wanted and file.found in known:
-            problem = f"{shown(file.found or '')} is not installed as a program, so that `ros2 run` may not find it"
+            problem = f"{printable(file.found or '')} is not installed as a program, so that `ros2 run` may not find it"
             yield f"{problem}; install it with install(PROGRAMS ...)"
 
 
@@ -283,7 +287,7 @@ def _notes_on(file: StudentFile) -> Iterator[str]:
     if file.others:
         yield _several(file)
     if file.executable and "/" not in file.wanted:
-        yield f"{file.wanted}: the graded executable is {file.executable}, in {shown(file.found or '')}"
+        yield f"{file.wanted}: the graded executable is {file.executable}, in {printable(file.found or '')}"
 
 
 def _look_for(
@@ -327,7 +331,9 @@ def _nearest_the_top(relative: str) -> tuple[int, bytes]:
 
 
 def _several(file: StudentFile) -> str:
-    return f"{shown(file.found or '')} is graded, because it is nearest the top; not graded: {first_of(file.others)}"
+    return (
+        f"{printable(file.found or '')} is graded, because it is nearest the top; not graded: {first_of(file.others)}"
+    )
 
 
 def _similar(wanted: str, files: Iterable[str], all_wanted: Sequence[str]) -> list[str]:

@@ -50,12 +50,12 @@ def main(limits: dict[str, Any]) -> int:
     if asked["packages"]:
         from grader.grading.submissions import project_reader  # noqa: PLC0415
 
-        project_reader.prepare()
+        project_reader.load_parsers()
     if asked["programs"]:
         from grader.grading.submissions import program_reader, source_encodings  # noqa: PLC0415
 
         heads = (bytes(contents[number][: source_encodings.HEAD_BYTES]) for _, number in asked["programs"])
-        known = program_reader.prepare(heads)
+        known = program_reader.load_encodings(heads)
     warnings.simplefilter("ignore")  # a warning would want to show the line of a file
     gc.disable()  # there are no cycles
     confine(limits)
@@ -66,7 +66,7 @@ def main(limits: dict[str, Any]) -> int:
         for package in asked["packages"]:
             files = {name: bytes(contents[number]) for name, number in package["files"].items()}
             below = list(_below(package["folder"], names)) if package["lists"] else []
-            found = project_reader.described(files, below)
+            found = project_reader.project_description(files, below)
             _write(sys.stdout.buffer, found)
             run.update(_run_by(found))
     if known is not None:
@@ -111,14 +111,14 @@ def _programs(
 ) -> Iterator[tuple[dict[str, Any], bytes, bytes]]:
     """Yield what each program holds, with its text and tree as far as they are told."""
     from grader.grading.submissions.answers import COSTLY, LONG_FILE  # noqa: PLC0415 - see above
-    from grader.grading.submissions.program_reader import described  # noqa: PLC0415
+    from grader.grading.submissions.program_reader import program_description  # noqa: PLC0415
 
     nodes_left, left, beside = MOST_NODES, MOST_TOLD, MOST_BESIDE
     for path, number in programs:
         if nodes_left <= 0:
             yield {"path": path, "reaches": [LONG_FILE], "problem": COSTLY}, b"", b""
             continue
-        found = described(bytes(contents[number]), known, decoded=decoded)
+        found = program_description(bytes(contents[number]), known, decoded=decoded)
         nodes_left -= found.nodes
         row, parts = {"path": path, **found.row}, {"text": found.text, "tree": found.tree}
         size = sum(len(part) for part in parts.values() if part is not None)

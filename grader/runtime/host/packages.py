@@ -116,7 +116,7 @@ def _is_file(root: str, folder: str, name: str) -> bool:
 def package_folders(root: str) -> list[str]:
     """Return the folders of all ROS packages in a submission, which can import each other once they are built."""
     found = []
-    for number, (folder, _, files) in enumerate(walk(root)):
+    for number, (folder, _, files) in enumerate(walk_folders(root)):
         if number >= FOLDERS:
             break
         found += [folder] if any(marker in files for marker in MARKERS) else []
@@ -142,7 +142,7 @@ def import_folders(root: str, module: str, base: str) -> list[str]:
     return [f for f in folders if f == base or not any(os.path.isfile(os.path.join(f, other)) for other in others)]
 
 
-def walk(root: str) -> Iterator[tuple[str, list[str], list[str]]]:
+def walk_folders(root: str) -> Iterator[tuple[str, list[str], list[str]]]:
     """Yield the folders of a submission as `os.walk` does, in order, without those that a tool has made."""
     for folder, folders, files in os.walk(root):
         if folder != root and any(marker in files for marker in GENERATED):

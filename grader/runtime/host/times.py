@@ -106,7 +106,7 @@ def install_wall_time(clock: VirtualClock) -> None:
     time.clock_gettime = read(time.clock_gettime, time.monotonic)
 
 
-def install_looks(clock: VirtualClock) -> None:
+def install_thread_looks(clock: VirtualClock) -> None:
     """Let time pass for programs that only poll whether another thread has done something."""
     fruitless: dict[tuple[Any, str], object] = {
         (threading.Event, "is_set"): False,

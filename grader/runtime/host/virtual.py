@@ -107,7 +107,7 @@ class VirtualTime:
         """
         threads.install_locks(self.scheduler, self.clock)
         threads.install_threads(self.scheduler, self.clock, describe, report)
-        times.install_looks(self.clock)
+        times.install_thread_looks(self.clock)
         times.install_sleep_and_clocks(self.scheduler, self.clock)
         threads.install_selectors(self.scheduler, self.clock, lambda: self.give_up_outside("waiting"))
 

@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 from hashlib import sha256
 from pathlib import Path
 
-from grader.runtime.interfaces.definitions import KINDS, DefinitionError, InterfacePackage, digest, read
+from grader.runtime.interfaces.definitions import KINDS, DefinitionError, InterfacePackage, digest, read_definitions
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
 
@@ -50,7 +50,7 @@ class BuiltInterfaces:
         return self.prefix / "share"
 
 
-def missing(packages: Collection[InterfacePackage], share: Sequence[Path]) -> tuple[InterfacePackage, ...]:
+def missing_packages(packages: Collection[InterfacePackage], share: Sequence[Path]) -> tuple[InterfacePackage, ...]:
     """Those packages that no installation provides.
 
     Args:
@@ -86,14 +86,14 @@ def build(packages: Collection[InterfacePackage], cache: Path, share: Sequence[P
         DefinitionError: A definition is wrong, or there are too many.
         EnvironmentFault: The generators of ROS are missing or fail.
     """
-    wanted = missing(packages, share)
+    wanted = missing_packages(packages, share)
     prefix = cache / _key(wanted, share)
     built = BuiltInterfaces(prefix, tuple(sorted(package.name for package in wanted)))
     if prefix.is_dir():
         return built
     for package in wanted:
         _check_name(package.name)
-    read(wanted, installed_messages(share))
+    read_definitions(wanted, installed_messages(share))
     cache.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="building-", dir=cache) as staging:
         made = Path(staging) / "prefix"

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 #: The packages that come with the grader.
 SHIPPED = Path(__file__).with_name("shipped")
@@ -66,7 +66,7 @@ class DefinitionError(GraderError):
     """
 
     def __init__(self, package: str, file: str, line: int, problem: str, fix: str) -> None:
-        place = shown(f"{package}/{file}" if file else package, 3 * _SHOWN)
+        place = printable(f"{package}/{file}" if file else package, 3 * _SHOWN)
         super().__init__(f"{place}{f', line {line}' if line else ''}: {problem}", fix)
         self.package = package
         self.file = file
@@ -160,7 +160,7 @@ class Interface:
 
 
 def _quoted(text: str) -> str:
-    return f"'{shown(text, _SHOWN)}'"
+    return f"'{printable(text, _SHOWN)}'"
 
 
 def _file(definition: DefinitionFile) -> str:
@@ -271,7 +271,7 @@ def digest(packages: Collection[InterfacePackage]) -> str:
     return made.hexdigest()
 
 
-def read(packages: Collection[InterfacePackage], installed: Collection[str]) -> tuple[Interface, ...]:
+def read_definitions(packages: Collection[InterfacePackage], installed: Collection[str]) -> tuple[Interface, ...]:
     """Read the definitions of packages that belong together.
 
     Args:
@@ -310,7 +310,7 @@ def _unknown_type(interface: Interface, member: FieldOrConstant, known: Collecti
     if local and (same or bare):
         near = same[:1] or bare
     fix = f"did you mean {near[0].replace('/msg/', '/')}?" if near else "bring the package that defines it"
-    problem = f"no message {shown(member.type.base.replace('/msg/', '/'), _SHOWN)} is known"
+    problem = f"no message {printable(member.type.base.replace('/msg/', '/'), _SHOWN)} is known"
     return DefinitionError(interface.package, interface.file, member.line, problem, fix)
 
 
@@ -411,11 +411,13 @@ class _Reader:
             raise self._error(f"{_quoted(text)} is not a type", _FIX_TYPE)
         base, bound, size = match["base"], match["bound"], match["size"]
         if bound is not None and base not in {"string", "wstring"}:
-            name = shown(base, _SHOWN)
+            name = printable(base, _SHOWN)
             raise self._error(f"{name} cannot have a greatest length", f"write {name} or {name}[<={bound}]")
         for number in (bound, size):
             if number is not None and (len(number) > _MOST_DIGITS or not 0 < int(number) < 2**31):
-                raise self._error(f"a length of {shown(number, _SHOWN)} is not possible", "write a length from 1 on")
+                raise self._error(
+                    f"a length of {printable(number, _SHOWN)} is not possible", "write a length from 1 on"
+                )
         array = "" if not match["array"] else "unbounded" if size is None else "bounded" if match["limit"] else "fixed"
         return FieldType(self._base(base), int(bound) if bound else None, array, int(size or 0))
 

@@ -29,7 +29,7 @@ from grader.runtime.interfaces.definitions import (
     Interface,
     Section,
     find_packages,
-    read,
+    read_definitions,
 )
 
 RUNTIME = "_grader_interfaces"
@@ -78,7 +78,7 @@ class InstalledTypes:
 def generate(prefix: Path, installed: InstalledTypes) -> None:
     """Write the packages, their type descriptions and the runtime below a prefix that holds their definitions."""
     packages = find_packages(prefix / "share")
-    interfaces = read(packages, installed.names())
+    interfaces = read_definitions(packages, installed.names())
     elements = {interface.name: _element(interface) for interface in interfaces}
     _write_descriptions(prefix, elements, installed)
     for package in packages:

@@ -25,7 +25,7 @@ from grader.runtime.interfaces.definitions import (
     find_packages,
 )
 from grader.runtime.model.errors import GraderError
-from grader.runtime.model.wording import shown
+from grader.runtime.model.wording import printable
 
 #: Characters of an exception that a note shows.
 _CAUSE = 200
@@ -49,7 +49,7 @@ def main() -> None:
         # Names and values that ROS's generators or the file system do not take: no list of them can be complete.
         if not _builds_others(Path(request["into"]), request):
             raise
-        cause = shown(f"{type(error).__name__}: {error}", _CAUSE)
+        cause = printable(f"{type(error).__name__}: {error}", _CAUSE)
         answer = _failed(f"the interface definitions of the submission are not used: building them ended with {cause}")
     sys.stdout.write(json.dumps(answer))
 

@@ -27,7 +27,7 @@ class AuthorMistake:
         return f"{self.file}:{self.line}: {self.text}" if self.line else f"{self.file}: {self.text}"
 
 
-def run(prefix: str, path: str, content: bytes) -> ModuleType:
+def run_author_file(prefix: str, path: str, content: bytes) -> ModuleType:
     """Return the module of a file; the same file with the same content runs once per process and prefix.
 
     Args:
@@ -64,6 +64,6 @@ def line_of(error: BaseException, path: str, default: int = 1) -> int:
     return (lines[-1] if lines else None) or default
 
 
-def words_of(error: BaseException) -> str:
+def error_words(error: BaseException) -> str:
     """Return what an error says, without the place of a syntax error."""
     return str(error.msg) if isinstance(error, SyntaxError) else str(error)

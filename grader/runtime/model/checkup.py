@@ -62,7 +62,7 @@ def missing(properties: Sequence[Property]) -> tuple[Property, ...]:
     return tuple(found for found in properties if found.name in REQUIRED and not found.holds)
 
 
-def described(isolation: str, properties: Sequence[Property]) -> str:
+def isolation_line(isolation: str, properties: Sequence[Property]) -> str:
     """Format the tier and each property with its mechanism on one line; exactly `none` without a sandbox."""
     if isolation == NO_SANDBOX or not properties:
         return isolation

@@ -4,7 +4,9 @@ from typing import Annotated
 
 from grader.runtime.model.dataclass import dataclass
 
+#: Nanoseconds in a second.
 NS_PER_S = 1_000_000_000
+#: Nanoseconds in a millisecond.
 NS_PER_MS = 1_000_000
 KIB, MIB, GIB = 1 << 10, 1 << 20, 1 << 30
 

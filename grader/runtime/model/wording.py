@@ -8,7 +8,7 @@ from collections.abc import Sequence
 SHOWN_LENGTH = 80
 
 
-def shown(text: str, limit: int = SHOWN_LENGTH) -> str:
+def printable(text: str, limit: int = SHOWN_LENGTH) -> str:
     """Return text as one printable line, with escaped control characters and lone surrogates, cut in the middle."""
     kept = text if len(text) <= 2 * limit else text[:limit] + text[-limit:]
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in kept)
@@ -28,4 +28,4 @@ def listed(names: list[str] | tuple[str, ...], conjunction: str = "or") -> str:
 def first_of(names: Sequence[str]) -> str:
     """Return the first three names as a phrase that ends in `and 2 more`, if there are more."""
     more = [f"{len(names) - 3} more"] if len(names) > 3 else []
-    return listed([*map(shown, names[:3]), *more], "and")
+    return listed([*map(printable, names[:3]), *more], "and")

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
-from grader.runtime.host.packages import CMAKE, FOLDERS, SKIPPED, package_folders, walk
+from grader.runtime.host.packages import CMAKE, FOLDERS, SKIPPED, package_folders, walk_folders
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.projects import Project
 
@@ -60,7 +60,7 @@ def project_folders(root: Path) -> list[Path]:
 
 def files_below(folder: Path) -> Iterator[str]:
     """Yield the paths of all files below a folder, relative to it, without those in folders that a tool has made."""
-    for here, _, files in walk(str(folder)):
+    for here, _, files in walk_folders(str(folder)):
         for file in files:
             yield Path(here, file).relative_to(folder).as_posix()
 
@@ -182,7 +182,7 @@ class _Files:
         """Return the files below a folder by name, the ones nearest the top first."""
         found: dict[str, list[Path]] = {}
         seen = 0
-        for above, _, names in walk(str(folder)):
+        for above, _, names in walk_folders(str(folder)):
             seen += len(names)
             for name in names:
                 found.setdefault(name, []).append(Path(above, name))
@@ -216,7 +216,7 @@ def workspace_of(package: Path) -> Path:
     }
     cloned = next((up for up in above if _is_cloned(up)), None)
     if cloned is not None and cloned not in beside:
-        beside[cloned] = {name_of(folder) for folder in project_folders(cloned) if folder != package}
+        beside[cloned] = {package_name(folder) for folder in project_folders(cloned) if folder != package}
     named = words_of(package) & {name for names in beside.values() for name in names}
     nearest = next((up for up, names in beside.items() if named <= names), package)
     return nearest if beside.get(nearest) else package
@@ -229,7 +229,7 @@ _LEVELS = (("*", "*/*"), ("*", "*/*"))
 def _names_in(folder: Path, package: Path, levels: Sequence[str]) -> Iterator[str]:
     """Yield the names of the packages in a folder, but for one."""
     for level in levels:
-        yield from (name_of(one.parent) for one in folder.glob(f"{level}/package.xml") if one.parent != package)
+        yield from (package_name(one.parent) for one in folder.glob(f"{level}/package.xml") if one.parent != package)
 
 
 def _is_cloned(folder: Path) -> bool:
@@ -241,7 +241,7 @@ def is_package(folder: Path) -> bool:
     return (folder / "package.xml").is_file()
 
 
-def name_of(package: Path) -> str:
+def package_name(package: Path) -> str:
     """Return the name of a package: that in its package.xml, or else that of its folder."""
     found, path = None, package / "package.xml"
     with contextlib.suppress(OSError):
@@ -265,7 +265,7 @@ def needed_packages(package: Path, workspace: Path) -> list[Path]:
     """Return a package and those of its workspace that it names, with those that they name."""
     known: dict[str, Path] = {}
     for folder in project_folders(workspace):
-        known.setdefault(name_of(folder), folder)
+        known.setdefault(package_name(folder), folder)
     needed, new = {package: None}, [package]
     while new:
         named = words_of(new.pop())
@@ -285,5 +285,5 @@ def ignored_packages(workspace: Path) -> dict[str, Path]:
         if IGNORED in files and Path(here) != workspace:
             folders.clear()
             for inner in project_folders(Path(here)):
-                found.setdefault(name_of(inner), Path(here))
+                found.setdefault(package_name(inner), Path(here))
     return found

@@ -12,7 +12,7 @@ from grader.runtime.host.packages import parsed
 from grader.runtime.model.limits import MAX_PARSED_BYTES
 
 
-def read(content: bytes | str) -> ast.Module | SyntaxError | None:
+def read_inert(content: bytes | str) -> ast.Module | SyntaxError | None:
     """Return what a file holds, or why Python cannot compile it; None if only a process should find out.
 
     Only a contained process asks this about what students wrote.
@@ -27,7 +27,7 @@ def read(content: bytes | str) -> ast.Module | SyntaxError | None:
             return None
 
 
-def text_of(path: Path) -> bytes | None:
+def read_text(path: Path) -> bytes | None:
     """Return the content of a file; None if it is large, or a pipe or device, which might never end or begin."""
     if not stat.S_ISREG(path.stat().st_mode):
         return None

@@ -83,7 +83,7 @@ def _openings(text: bytes) -> int:
     return text.count(b"[") + text.count(b"{")
 
 
-def fields_of(text: msgspec.Raw) -> Mapping[str, Any]:
+def decoded_fields(text: msgspec.Raw) -> Mapping[str, Any]:
     """Decode the fields of a JSON object.
 
     Raises MsgspecError if the text is not an object, and RecursionError if it is nested too deeply.
@@ -240,7 +240,7 @@ def _without_bytes(kind: type[Message] | type[Delivery]) -> Callable[[Any], Obse
         t_ns(made, row.t_ns)
         topic(made, row.topic)
         type_(made, row.type)
-        value(made, fields_of(row.value))
+        value(made, decoded_fields(row.value))
         cdr(made, b"")
         for before_discovery in early:  # of messages of students' nodes
             before_discovery(made, row.before_discovery)
@@ -320,7 +320,7 @@ _MAKERS: Mapping[type, Callable[[Any], Observation]] = {
 _DECODER = msgspec.json.Decoder(_trace_row(_ROWS.values()))
 
 
-def pack(trace: Trace, there: Sequence[bool]) -> bytes:
+def pack_trace(trace: Trace, there: Sequence[bool]) -> bytes:
     """Pack a trace as JSON; the same trace gives the same bytes.
 
     For each observation, `there` says whether the recording contains its bytes as a message.
@@ -332,7 +332,7 @@ def pack(trace: Trace, there: Sequence[bool]) -> bytes:
     return json.dumps(data, allow_nan=False, separators=(",", ":")).encode()
 
 
-def unpack(data: bytes) -> Trace:
+def unpack_trace(data: bytes) -> Trace:
     """Unpack a trace without the bytes of messages, which judging does not read; raises EvidenceError if invalid."""
     if not data.isascii():
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte

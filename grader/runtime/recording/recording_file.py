@@ -44,7 +44,7 @@ from grader.runtime.model.trace import (
     Trace,
 )
 from grader.runtime.recording.codec import observation_to_json, plain, to_json
-from grader.runtime.recording.packed import pack, unpack, unpack_exactly
+from grader.runtime.recording.packed import pack_trace, unpack_exactly, unpack_trace
 
 #: The attachment with everything that judging reads.
 TRACE = "trace.json.zst"
@@ -165,7 +165,7 @@ class Shown:
     exact: bool = False  # whether `cdr` is exactly what was sent, as in the trace
 
 
-def shown(observations: tuple[Observation, ...], brought: Mapping[str, Definition]) -> Iterator[Shown]:
+def observation_messages(observations: tuple[Observation, ...], brought: Mapping[str, Definition]) -> Iterator[Shown]:
     """Yield one message for each observation, in order."""
     for observation in observations:
         if isinstance(observation, (Message, Delivery)):
@@ -280,8 +280,8 @@ def recording_bytes(
     part of rosbag2's metadata. Brought are the definitions of message types that are not installed.
     """
     about, brought = _about(trace, facts), brought or {}
-    messages = [said(0, RUN, about), *shown(trace.observations, brought)]
-    packed = pack(trace, [message.exact for message in messages[1:]])
+    messages = [said(0, RUN, about), *observation_messages(trace.observations, brought)]
+    packed = pack_trace(trace, [message.exact for message in messages[1:]])
     stream = io.BytesIO()
     writer = Writer(stream, compression=CompressionType.ZSTD)
     writer.start(profile="ros2", library=_LIBRARY)
@@ -314,7 +314,7 @@ def trace_at(recording: bytes, at: int, size: int) -> Trace:
     """Read the trace at an offset of a recording, without the bytes of messages, which judging does not read."""
     with _reading():
         data = _unpressed(recording[at : at + size])
-    return unpack(data)
+    return unpack_trace(data)
 
 
 def trace_of(recording: bytes) -> Trace:

@@ -27,7 +27,7 @@ from grader.runtime.sandbox.exposure import (
     taken_users,
     view_of,
 )
-from grader.runtime.sandbox.properties import install_command
+from grader.runtime.sandbox.properties import package_command
 from grader.runtime.sandbox.protocol import (
     INSTALLED,
     Command,
@@ -75,13 +75,13 @@ class Bubblewrap:
         """
         if not seccomp.supports(platform.machine()):
             raise EnvironmentFault(f"sandbox: expected x86_64 or aarch64, found {platform.machine()}")
-        bwrap = _program("bwrap", install_command("bubblewrap"))
+        bwrap = _program("bwrap", package_command("bubblewrap"))
         told = subprocess.run([bwrap, "--help"], capture_output=True, check=False, env={})
         return cls(
             bwrap=bwrap,
-            prlimit=_program("prlimit", install_command("util-linux")),
-            setpriv=_program("setpriv", install_command("util-linux")),
-            cat=_program("cat", install_command("coreutils")),
+            prlimit=_program("prlimit", package_command("util-linux")),
+            setpriv=_program("setpriv", package_command("util-linux")),
+            cat=_program("cat", package_command("coreutils")),
             can_fork=_kernel() >= ENTERABLE,
             as_root=os.geteuid() == 0,
             can_forbid_userns=b"--disable-userns" in told.stdout + told.stderr,
@@ -323,7 +323,7 @@ def _kernel() -> tuple[int, ...]:
     return tuple(int(number) for number in re.findall(r"\d+", platform.release())[:2])
 
 
-def is_installed() -> bool:
+def has_bubblewrap() -> bool:
     """Return whether this machine has the program bubblewrap."""
     return _found("bwrap") is not None
 

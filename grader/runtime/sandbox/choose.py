@@ -11,7 +11,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.ros_installation import RosInstallation
 from grader.runtime.sandbox import tiers
-from grader.runtime.sandbox.bubblewrap import is_installed
+from grader.runtime.sandbox.bubblewrap import has_bubblewrap
 from grader.runtime.sandbox.memory import Memory
 from grader.runtime.sandbox.properties import NO_EXCHANGE, NOTHING, remedy_for
 from grader.runtime.sandbox.protocol import Isolation
@@ -161,7 +161,7 @@ def _refusal(mine: Sequence[TierReport], tried: Sequence[TierReport]) -> Environ
     # The remedy of a tier for another user comes last, because it requires the most.
     remedies = [report.remedy for report in (*mine, *tried) if report.remedy]
     hint = remedies[0] if remedies else "grade doctor says what each tier lacks"
-    lacks, details = ("a sandbox that works", f" ({found})") if is_installed() else ("bubblewrap", "")
+    lacks, details = ("a sandbox that works", f" ({found})") if has_bubblewrap() else ("bubblewrap", "")
     text = f"isolation: this computer lacks {lacks}, which keeps your program from harming it; nothing was run{details}"
     return EnvironmentFault(text, hint)
 

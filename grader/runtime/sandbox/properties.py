@@ -72,7 +72,7 @@ INSTALLERS = {
 IN_CONTAINER = "start the container without a network: docker run --network none"
 
 
-def install_command(package: str) -> str:
+def package_command(package: str) -> str:
     """Return the command that installs a system package."""
     installer = next((command for name, command in INSTALLERS.items() if shutil.which(name)), INSTALLERS["apt-get"])
     return f"{_sudo()}{installer} {package}"
@@ -81,7 +81,7 @@ def install_command(package: str) -> str:
 def remedy_for(report: TierReport, settings: Path = SETTINGS_FOLDER) -> str:
     """Return the command or action that would make a tier work; empty if none is known."""
     if any(found.name == "net_egress" and not found.holds for found in report.properties):
-        return IN_CONTAINER if confined() else ""
+        return IN_CONTAINER if has_filter() else ""
     if report.name.startswith("bubblewrap") and not report.properties:
         return setting_command(settings)
     return ""
@@ -96,7 +96,7 @@ def setting_command(settings: Path = SETTINGS_FOLDER) -> str:
     return ""
 
 
-def confined() -> bool:
+def has_filter() -> bool:
     """Return whether this process has a seccomp filter, as in containers."""
     status = Path("/proc/self/status").read_text(encoding="utf-8", errors="replace")
     return any(line.split() == ["Seccomp:", "2"] for line in status.splitlines())

@@ -53,7 +53,7 @@ def inspect(isolation: Isolation, ros: RosInstallation) -> TierReport:
     """Run a probe inside a tier and return the report on the tier; takes about half a second."""
     letter = TIERS[isolation.name]
     with laid_bait() as bait:
-        answer, why = trial(isolation, ros, bait)
+        answer, why = trial_answer(isolation, ros, bait)
         if set(answer.get("achieved", ())) != set(PROPERTIES):
             why = why or str(answer.get("said") or "the probe did not answer")
             return TierReport(isolation.name, letter, usable=False, why=f"no process runs in it: {why}")
@@ -79,7 +79,7 @@ def why_not(contained: tuple[Property, ...]) -> str:
     return "; ".join(map(str, missing(contained)))
 
 
-def trial(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
+def trial_answer(isolation: Isolation, ros: RosInstallation, bait: Bait) -> tuple[dict[str, Any], str]:
     """Run the trial and return its answer, or an empty one with the reason."""
     submission = bait.folder / "submission"
     domains = domains_of(shared=isolation.shares_network)

@@ -98,7 +98,7 @@ def prepare(request: dict[str, Any]) -> None:
     confinement, program = request["confinement"], bytes.fromhex(request["filter"])
     rules = ruleset(system, confinement, request["folder"]) if confinement else None
     if request["user"]:
-        become(system, *request["user"], reach=bool(confinement and confinement["reach"]))
+        become_user(system, *request["user"], reach=bool(confinement and confinement["reach"]))
     elif program and (not confinement or os.geteuid() == 0):  # an ordinary user has none, and may not drop any
         drop_capabilities(system)
     # Changing the user resets both, so they have to come afterwards.
@@ -303,7 +303,7 @@ def entries(folder: str) -> Iterator[os.DirEntry[str]]:
                     folders.append(entry.path)
 
 
-def become(system: Any, user: int, group: int, *, reach: bool) -> None:
+def become_user(system: Any, user: int, group: int, *, reach: bool) -> None:
     """Change to another user with a single group, without privileges.
 
     To `reach` is to keep the privilege to enter folders that are closed to the user; Landlock still restricts it.

@@ -221,7 +221,7 @@ class Plain(_OnSharedNetwork):
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
         """Return the limits of a student's process; raises HarnessError without a ROS domain."""
         require_domain(process, PLAIN_NAME)
-        folder = own_folder(self.scratch, process)
+        folder = process_folder(self.scratch, process)
         environment = environment_in(process, folder)
         environment |= loopback_only(environment)
         request = start_request(str(folder), made=True, limits=by_resource(limits), **copies(process))
@@ -256,7 +256,7 @@ class OwnNetwork(InPlace):
 
     def prepared_sandbox(self, process: StudentProcess, limits: Limits) -> PreparedSandbox:
         """Return the limits of a process."""
-        folder = own_folder(self.scratch, process)
+        folder = process_folder(self.scratch, process)
         request = start_request(str(folder), made=True, limits=by_resource(limits), **copies(process))
         return PreparedSandbox(request, environment_in(process, folder))
 
@@ -289,14 +289,14 @@ def environment_in(process: StudentProcess, folder: Path) -> dict[str, str]:
     return {**student_environment(process, folder / "home"), "PWD": str(folder / str(copies(process)["working"]))}
 
 
-def own_folder(scratch: Path, process: StudentProcess) -> Path:
+def process_folder(scratch: Path, process: StudentProcess) -> Path:
     """Return the folder of a process, which is created when it starts."""
     return scratch / f"grade-student-{process.own or secrets.token_hex(8)}"
 
 
 def seen_in_place(process: StudentProcess, scratch: Path) -> str:
     """Return where a process sees its submission: its copy in its own folder, or where the submission lies."""
-    return str(own_folder(scratch, process) / COPY) if process.writable else str(process.submission)
+    return str(process_folder(scratch, process) / COPY) if process.writable else str(process.submission)
 
 
 def loopback_only(environment: Mapping[str, str]) -> dict[str, str]:
@@ -328,7 +328,7 @@ def confined(process: StudentProcess, limits: Limits, ground: Ground) -> Prepare
     """
     if ground.as_root:
         make_readable(process.submission)
-    folder = own_folder(ground.scratch, process)
+    folder = process_folder(ground.scratch, process)
     environment = environment_in(process, folder)
     environment |= loopback_only(environment) if ground.loopback else {}
     request = start_request(

@@ -60,10 +60,10 @@ def trial(request: dict[str, Any], segment: str) -> dict[str, Any]:
     before = condition()
     reading, writing = os.pipe()
     with started(request, segment, reading) as process:
-        answered, kept = exchange(process, request["domain"])
+        answered, kept = exchange_messages(process, request["domain"])
         os.close(writing)  # ends the exchange
         with ThreadPoolExecutor() as pool:  # so that neither stream blocks the probe
-            out, err = pool.map(read, (process.stdout, process.stderr))
+            out, err = pool.map(rest_of, (process.stdout, process.stderr))
     lines = out.decode("utf-8", "replace").splitlines()
     errors = err.decode("utf-8", "replace").strip().splitlines()
     achieved: dict[str, list[str]] = json.loads(lines[0]) if lines else {}
@@ -83,7 +83,7 @@ def condition() -> Mapping[str, object]:
     }
 
 
-def read(stream: IO[bytes] | None) -> bytes:
+def rest_of(stream: IO[bytes] | None) -> bytes:
     """Return the rest of a stream."""
     return b"" if stream is None else stream.read()
 
@@ -150,7 +150,7 @@ def probe_process(request: dict[str, Any], segment: str) -> tuple[Isolation, Stu
     )
 
 
-def exchange(process: subprocess.Popen[bytes] | StartedProcess, domain: int) -> tuple[bool, Any]:
+def exchange_messages(process: subprocess.Popen[bytes] | StartedProcess, domain: int) -> tuple[bool, Any]:
     """Send a message until it comes back from the probe; return whether it did while that ran, and the node."""
     import rclpy  # noqa: PLC0415 -- the probe starts meanwhile
     from std_msgs.msg import String  # noqa: PLC0415

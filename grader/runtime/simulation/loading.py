@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Any, TypeVar
 
-from grader.runtime.model.author_files import AuthorMistake, line_of, run, words_of
+from grader.runtime.model.author_files import AuthorMistake, error_words, line_of, run_author_file
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.simulation.participant import Simulation
 from grader.runtime.simulation.robots import SIMULATIONS
@@ -35,10 +35,10 @@ class _Endless(BaseException):
 
 def classes(path: str, content: bytes) -> Any:
     """Return the table of simulations in an author's file, None without one; raises what the file raises."""
-    return vars(run("_own_simulations", path, content)).get(TABLE)
+    return vars(run_author_file("_own_simulations", path, content)).get(TABLE)
 
 
-def made(name: str, path: str, content: bytes, parameters: Mapping[str, Any]) -> Simulation:
+def made_simulation(name: str, path: str, content: bytes, parameters: Mapping[str, Any]) -> Simulation:
     """Return a simulation.
 
     Args:
@@ -85,7 +85,7 @@ def guarded(name: str, path: str, work: Callable[[], Result], begins: int = 1, m
         return work()
     except (Exception, SystemExit, _Endless) as error:  # whatever the author's file raises, the author has to fix
         kind = "" if isinstance(error, _Endless) else f"{type(error).__name__}: "
-        text = f"the simulation `{name}` failed: {kind}{words_of(error)[:200]}"
+        text = f"the simulation `{name}` failed: {kind}{error_words(error)[:200]}"
         if not path:
             raise HarnessError(text) from error
         raise SimulationError(AuthorMistake(path, line_of(error, path, begins), text)) from error

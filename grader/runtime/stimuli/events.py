@@ -32,6 +32,6 @@ class Disappear(TopicEvent):
     """Remove a publisher."""
 
 
-def in_order(events: Iterable[Event]) -> list[Event]:
+def events_in_order(events: Iterable[Event]) -> list[Event]:
     """Sort events by time; at time 0, endpoints are created before anything else happens."""
     return sorted(events, key=lambda event: (event.t_ns, event.t_ns == 0 and not event.creates))

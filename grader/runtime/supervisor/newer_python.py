@@ -22,7 +22,7 @@ from grader.runtime.contained import run_contained
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.releases import release_of
 from grader.runtime.model.trace import Fault, FaultKind, NewerPython, Trace
-from grader.runtime.programs.inert import text_of
+from grader.runtime.programs.inert import read_text
 
 Version: TypeAlias = tuple[int, int]
 HERE: Version = sys.version_info[:2]
@@ -111,7 +111,7 @@ _NEWER = re.compile(rb"(?:[fF][rR]?|[rR][fF])['\"]|\btype\b|\b(?:def|class)\b[\s
 def _of_file(root: Path, file: str, distro: str) -> bool:
     """Return whether Python 3.12 reads a file of a submission."""
     try:
-        text = text_of(root / file) if file else None
+        text = read_text(root / file) if file else None
     except OSError:
         return False
     if text is None or _NEWER.search(text) is None:

@@ -21,7 +21,7 @@ def ends_of_kind(claims: Iterable[Claim], kind: str) -> list[Claim]:
     return [c for c in claims if c.kind == kind]
 
 
-def ends_of(claims: Iterable[Claim], kind: str, name: str) -> list[Claim]:
+def claims_of(claims: Iterable[Claim], kind: str, name: str) -> list[Claim]:
     """Return the endpoints of a kind and name; every node has some services."""
     # The services of parameters and of types come with a node, and hosts do not report them one by one.
     node = name.rpartition("/")[0] if kind == "service" else ""

@@ -20,7 +20,7 @@ from grader.runtime.model.scenario import Event
 from grader.runtime.stimuli.calls import Ask
 from grader.runtime.stimuli.events import TopicEvent
 from grader.runtime.stimuli.simulation import Step
-from grader.runtime.worker.claims import ORDINARY_END, compatible, ends_of, ends_of_kind, passes, readers_of
+from grader.runtime.worker.claims import ORDINARY_END, claims_of, compatible, ends_of_kind, passes, readers_of
 
 #: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
 #: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
@@ -396,7 +396,7 @@ class Core(Generic[P]):
         for channel, count in sorted(counts.items()):
             kind, _, name = channel.partition(" ")
             if kind == "topic":
-                writers = ends_of(sender.claims, "publisher", name)
+                writers = claims_of(sender.claims, "publisher", name)
                 self.kept[sender.name, name] += count if any(w.qos.latched for w in writers) else 0
                 for process in self.processes:
                     if any(compatible(w, r) for w in writers for r in readers_of(process.claims, name)):
@@ -407,7 +407,7 @@ class Core(Generic[P]):
     def exchanged(self, kind: str, service: str, count: int, ends: Sequence[Claim] = (ORDINARY_END,)) -> None:
         """Announce requests to servers, or responses to clients: every client of a service receives all responses."""
         for process in self.processes:
-            own = ends_of(process.claims, "service" if kind == "request" else "client", service)
+            own = claims_of(process.claims, "service" if kind == "request" else "client", service)
             if not process.ended and any(passes(sender, end) for sender in ends for end in own):
                 announce(process, f"{kind} {service}", count)
 
@@ -429,7 +429,7 @@ class Core(Generic[P]):
 
     def is_new(self, process: P, topic: str) -> bool:
         """Return whether a process has a publisher on a topic that has appeared at this instant."""
-        publishers = ends_of(process.claims, "publisher", topic)
+        publishers = claims_of(process.claims, "publisher", topic)
         return any(self._appeared_ns.get((process.name, c.number)) == self.now_ns for c in publishers)
 
     def appeared_ns(self, process: P, claim: Claim) -> int:
@@ -450,7 +450,7 @@ def announce(process: Process, channel: str, count: int) -> None:
 def senders(process: Process, channel: str) -> Sequence[Claim]:
     """Return the ends of a service with which a process sends on a channel."""
     kind, _, service = channel.partition(" ")
-    return ends_of(process.claims, "client" if kind == "request" else "service", service) or (ORDINARY_END,)
+    return claims_of(process.claims, "client" if kind == "request" else "service", service) or (ORDINARY_END,)
 
 
 class Arriving:

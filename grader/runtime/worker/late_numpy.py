@@ -29,6 +29,6 @@ def install() -> None:
     sys.modules.setdefault("numpy", LateNumpy())
 
 
-def load() -> None:
+def load_numpy() -> None:
     """Import numpy now, because a recording on the wall clock must not wait for it."""
     importlib.import_module("numpy").ndarray  # noqa: B018 - using a name imports it

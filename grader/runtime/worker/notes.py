@@ -142,7 +142,7 @@ def note_of(file: str, data: Note, places: Places) -> str:
     return say(file, data, places) if say is not None else ""
 
 
-def start_of(process: str, file: str, data: Note, places: Places) -> Start | None:
+def reported_start(process: str, file: str, data: Note, places: Places) -> Start | None:
     """Return how a process reports that its file is started; None if the report is not valid.
 
     Args:

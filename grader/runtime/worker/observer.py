@@ -33,7 +33,7 @@ from grader.runtime.worker import farewell
 from grader.runtime.worker.claims import BACKGROUND_TYPES
 from grader.runtime.worker.console import TEXT_CHARACTERS, Logged
 from grader.runtime.worker.core import Taken, in_order
-from grader.runtime.worker.ros_names import asked, listed
+from grader.runtime.worker.ros_names import ask_for_all, asked
 from grader.runtime.worker.service_ends import ServiceEnds
 
 LOG_TYPE = "rcl_interfaces/msg/Log"
@@ -133,7 +133,7 @@ class Observer:
             "publisher": self.node.get_publishers_info_by_topic,
             "subscription": self.node.get_subscriptions_info_by_topic,
         }
-        topics: list[tuple[str, list[str]]] = listed(self.node.get_topic_names_and_types)
+        topics: list[tuple[str, list[str]]] = ask_for_all(self.node.get_topic_names_and_types)
         nobody: list[Any] = []
         ends = [
             self._endpoint(kind, topic, info)
@@ -251,7 +251,7 @@ class Observer:
         return [_full_name(*pair) for pair in self._names_in_graph(existing)]
 
     def _names_in_graph(self, existing: Collection[str] | None) -> list[tuple[str, str]]:
-        known: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
+        known: list[tuple[str, str]] = ask_for_all(self.node.get_node_names_and_namespaces)
         pairs = [p for p in known if p[0] not in {*self._names, UNKNOWN_NODE}]
         return pairs if existing is None else self._without_gone(pairs, existing)
 
@@ -272,7 +272,7 @@ class Observer:
 
     def has_namesakes(self) -> bool:
         """Return whether nodes of one name are listed, of which one may have gone: of one, the others hide the rest."""
-        names: list[tuple[str, str]] = listed(self.node.get_node_names_and_namespaces)
+        names: list[tuple[str, str]] = ask_for_all(self.node.get_node_names_and_namespaces)
         return len({*names}) < len(names)
 
     def ends_of(self, kind: str, service: str) -> int:
@@ -286,10 +286,10 @@ class Observer:
         Nodes that have gone are left out, as the host leaves them out for programs: see `students_nodes`.
         """
         node = self.node
-        known: list[tuple[str, str]] = listed(node.get_node_names_and_namespaces)
+        known: list[tuple[str, str]] = ask_for_all(node.get_node_names_and_namespaces)
         nodes = self._without_gone(known)
-        topics: list[tuple[str, list[str]]] = listed(node.get_topic_names_and_types)
-        services: list[tuple[str, list[str]]] = listed(node.get_service_names_and_types)
+        topics: list[tuple[str, list[str]]] = ask_for_all(node.get_topic_names_and_types)
+        services: list[tuple[str, list[str]]] = ask_for_all(node.get_service_names_and_types)
         found = Counter(f"node {_full_name(*pair)}" for pair in nodes)
         for topic, _ in topics:
             if topic not in BACKGROUND:

@@ -20,7 +20,7 @@ def asked(question: Callable[..., Answer], *names: Any, nothing: Answer) -> Answ
         return nothing
 
 
-def listed(question: Callable[[], list[Answer]]) -> list[Answer]:
+def ask_for_all(question: Callable[[], list[Answer]]) -> list[Answer]:
     """Ask rcl for everything in the graph; nothing if a name in it is not text. Other failures are the grader's own."""
     try:
         return question()

@@ -13,7 +13,7 @@ from grader.runtime.model.trace import ClockKind, Mark, Observation, Offer, Trac
 from grader.runtime.plan import Plan
 from grader.runtime.simulation.participant import Moment
 from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCalls
-from grader.runtime.stimuli.events import Disappear, TopicEvent, in_order
+from grader.runtime.stimuli.events import Disappear, TopicEvent, events_in_order
 from grader.runtime.stimuli.server import AddServer, RemoveServer, Respond
 from grader.runtime.stimuli.simulation import Step
 from grader.runtime.worker.core import Agenda, Taken
@@ -53,8 +53,8 @@ class Runner(ABC):
         self._simulations = Simulations(plan)
         self._transits = {connection.topic: Transit(connection) for connection in plan.connections}
         # Simulations last: of two events at one instant, that of the plan comes first.
-        planned = in_order([*plan.events(), *self._simulations.events()])
-        due = in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
+        planned = events_in_order([*plan.events(), *self._simulations.events()])
+        due = events_in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
         end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
         self._agenda = Agenda(due, dict(plan.starts_ns), end_ns)
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one

@@ -16,7 +16,7 @@ from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.scenario import Event
 from grader.runtime.plan import Plan
-from grader.runtime.simulation.loading import SimulationError, begin_of, guarded, made
+from grader.runtime.simulation.loading import SimulationError, begin_of, guarded, made_simulation
 from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output, Simulation, types_heard
 from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
 from grader.runtime.stimuli.server import AddServer, PlannedServer
@@ -101,7 +101,7 @@ class _Running:
     def __init__(self, planned: PlannedSimulation, most: int, begun: Simulation | None = None) -> None:
         self._planned = planned
         self._left = most
-        self.simulation = begun or made(planned.name, planned.path, planned.content, planned.parameters)
+        self.simulation = begun or made_simulation(planned.name, planned.path, planned.content, planned.parameters)
         self.period_ns = max(SHORTEST_PERIOD_NS, self.simulation.period)
         self.hears = self._call(lambda: types_heard(self.simulation.hears()), "hears")
         self.serves = self._call(lambda: dict(self.simulation.serves()), "serves")

@@ -40,7 +40,7 @@ from grader.runtime.sandbox.starter import StartedProcess
 from grader.runtime.worker.console import TEXT_CHARACTERS
 from grader.runtime.worker.core import Process
 from grader.runtime.worker.ending import ended_by, exited, graders_fault, limit_behind
-from grader.runtime.worker.notes import Places, hidden_notes, note_of, start_of
+from grader.runtime.worker.notes import Places, hidden_notes, note_of, reported_start
 from grader.runtime.worker.workload import Workload
 
 #: The format of log records on standard error. Each process has its own token, known only to the logging library and
@@ -227,7 +227,7 @@ class NodeProcess(Process):
         """Record a note: how the file is started, which comes first, or something that readers must know."""
         # The first counts: a program that writes to this socket itself could only add another one.
         if report.code == "started":
-            if self.start_told is None and (start := start_of(self.name, self.file, report, self.places)):
+            if self.start_told is None and (start := reported_start(self.name, self.file, report, self.places)):
                 self.start_told = replace(start, arguments=self.arguments, launched_by=self.launched_by)
                 self.notes += hidden_notes(start)
         elif len(self.notes) < NOTES and (text := note_of(self.file, report, self.places)):

@@ -161,7 +161,7 @@ class Worker:
             runner = STEPPED[plan.clock](plan, students, observer, start, other.ask)
             is_real = plan.clock == ClockKind.WALL.value
             if is_real:
-                late_numpy.load()
+                late_numpy.load_numpy()
                 began.enter_context(OutputWatch(students, observer.wake, [other.descriptor]))
             other.tell({"now_ns": 0, "news": []})
             for data in other.commands(runner.idle if is_real else None):
@@ -260,7 +260,7 @@ class Worker:
 
             if plan.clock == ClockKind.WALL.value:
                 # Now, and not in the middle of the run, where its import would hold up the loop.
-                late_numpy.load()
+                late_numpy.load_numpy()
 
             observer = Observer(domain, plan.limits)  # while the starter is still busy with imports
             stack.callback(observer.close)
@@ -543,9 +543,9 @@ def _compact(observation: Observation) -> list[Any]:
 def _whole(observation: Observation) -> list[Any]:
     """Convert an observation for a rubric's test, with the fields of what the test has published as bytes."""
     if isinstance(observation, Delivery) and not observation.value:
-        from grader.runtime.serialization import fields_of  # noqa: PLC0415 - imports rclpy, which takes long
+        from grader.runtime.serialization import carried_fields  # noqa: PLC0415 - imports rclpy, which takes long
 
-        observation = replace(observation, value=fields_of(observation))
+        observation = replace(observation, value=carried_fields(observation))
     return observation_to_json(observation)
 
 
@@ -600,11 +600,11 @@ def serve(request: Mapping[str, Any], executed: StarterProcess | None) -> None:
             answer = {"problem": error.message, "has_started": worker.has_started}
         except Exception:
             answer = {"problem": traceback.format_exc()[-4000:], "has_started": worker.has_started}
-        answers.writelines(written(answer))
+        answers.writelines(answer_parts(answer))
         answers.flush()
 
 
-def written(answer: Mapping[str, Any]) -> Iterator[str]:
+def answer_parts(answer: Mapping[str, Any]) -> Iterator[str]:
     """Yield the parts of the JSON line of an answer; a large trace would take several times its memory as a whole."""
     trace = answer.get("trace")
     if trace is None:

@@ -22,12 +22,12 @@ from grader.api import grade_packed, pack_task, store_answer
 from grader.cli.main import app
 from grader.course.classroom import receiving
 from grader.course.classroom.local import Attempt, GradingProcesses
-from grader.course.classroom.messages import Parcel, pack
-from grader.course.classroom.schedulers import DASK, named
+from grader.course.classroom.messages import Parcel, pack_message
+from grader.course.classroom.schedulers import DASK, scheduler_name
 from grader.course.classroom.store import State
 from grader.grading.app.doctor import _added
 from grader.grading.model.entry_points import SCHEDULERS as GROUP
-from grader.grading.model.entry_points import load
+from grader.grading.model.entry_points import load_registered
 from grader.grading.model.exercise import Drawn
 
 #: A scheduler that does as the fake one of this folder's tests, but for a method.
@@ -103,7 +103,7 @@ def test_dask_is_registered_like_any_other() -> None:
     """The metadata of the installed grader name it; nothing else of the grader knows where it is."""
     found = [entry for entry in metadata.entry_points(group=GROUP) if entry.dist and entry.dist.name == "rclpy-grader"]
     assert [(entry.name, entry.value) for entry in found] == [("dask", "grader.course.classroom.cluster:connect")]
-    assert load(GROUP, "dask", object, "a function") is not None
+    assert load_registered(GROUP, "dask", object, "a function") is not None
 
 
 @pytest.mark.parametrize(("text", "place"), [("mine=a=b,c", "a=b,c"), ("mine=", ""), ("mine", "")])
@@ -170,13 +170,13 @@ def test_addresses_and_files_stay_those_of_dask(package: Path, text: str) -> Non
     register(package, GROUP, {"mine": "mine_module:connect"}, "1 / 0")
     if ":" not in text:
         Path(text).write_text("{}")
-    assert named(text) == (DASK, text)
+    assert scheduler_name(text) == (DASK, text)
 
 
 def test_the_name_of_dask_stays_the_graders(package: Path) -> None:
     """Whatever a package registers; `grade doctor` says that it is in vain."""
     register(package, GROUP, {"dask": "mine_module:connect"}, "1 / 0")
-    found = load(GROUP, "dask", object, "a function")
+    found = load_registered(GROUP, "dask", object, "a function")
     assert found is not None
     assert found[1].startswith("the scheduler 'dask' of rclpy-grader ")
     (fact,) = _added()
@@ -192,9 +192,9 @@ def test_metadata_without_dask_are_said_to_be_old(package: Path, monkeypatch: py
 def test_a_parcel_of_another_version_is_not_graded(tmp_path: Path) -> None:
     """Nor is anything that no grader packed: both are failures of the machine."""
     one = task(tmp_path)
-    other = store_answer(one, grade_packed(pack(Parcel("0.0.1", b"", b""))), "lab")
+    other = store_answer(one, grade_packed(pack_message(Parcel("0.0.1", b"", b""))), "lab")
     assert (other.status.state, "expected rclpy-grader 0.0.1" in other.status.problem) == (State.FAILED, True)
-    for sent in (b"", b"\x00", pack(Parcel("0.1.0", b"", b""))):
+    for sent in (b"", b"\x00", pack_message(Parcel("0.1.0", b"", b""))):
         assert store_answer(one, grade_packed(sent), "lab").status.state is State.FAILED
     for answer in (None, b"", b"\x93", 7, "text"):
         assert store_answer(one, answer, "lab").status.problem == "lab: expected a result, found something else"

@@ -12,14 +12,14 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from class_samples import FakeScheduler, course, grade, hand_in, report, scores
+from class_samples import FakeScheduler, course, grade, hand_in, report, scores, without_line
 from hypothesis import given
 from hypothesis import strategies as st
 from places import ROOT
 
 from grader.course.classroom.adjustments import Adjustments, Amount, Decision, adjust, read_adjustments
 from grader.course.classroom.gradebook import decision_line
-from grader.course.classroom.outputs import platforms, render_summary
+from grader.course.classroom.outputs import platforms, render_graded
 from grader.course.classroom.platforms import feedback
 from grader.grading.app.request import GradeRequest
 from grader.runtime.model.errors import ClassError
@@ -202,10 +202,11 @@ def test_a_criterion_is_decided_beside_what_the_grader_found(tmp_path: Path) -> 
     assert "10 points, less 1 for 1 day late." in page
     assert "Comment: see &lt;my&gt; note" in page
     (tmp_path / "out/adjust.yaml").unlink()
-    with pytest.raises(ClassError, match=r"expected the 1 decision of .*adjust\.yaml, which the last run applied"):
+    with pytest.raises(ClassError, match=r"expected .*adjust\.yaml, which the last run used, found nothing"):
         grade(course(tmp_path / "in", tmp_path / "out"))
     assert (tmp_path / "out/students/ada/feedback.html").read_text(encoding="utf-8") == page
-    graded = grade(course(tmp_path / "in", tmp_path / "out", no_adjustments=True))
+    without_line(tmp_path / "out", "adjust")
+    graded = grade(course(tmp_path / "in", tmp_path / "out"))
     assert graded.moved == ("ada 9 -> 4",)
     page = (tmp_path / "out/students/ada/feedback.html").read_text(encoding="utf-8")
     assert "<title>ada: 4 of 10 points</title>" in page
@@ -374,15 +375,15 @@ def test_every_decision_is_in_the_terminal_the_gradebook_and_the_page(tmp_path: 
         "dan": "8 -> 8 (comment)",
         "eve": "no score -> 6 (score set, by mail)",
     }
-    said = render_summary(graded).splitlines()
+    said = render_graded(graded).splitlines()
     first = said.index("decisions (5):") + 1
     assert said[first : first + 5] == [f"    {name} {line}" for name, line in lines.items()]
     rows = csv.DictReader(io.StringIO((tmp_path / "out/gradebook.csv").read_text(encoding="utf-8"), newline=""))
     assert {row["name"]: row["decisions"] for row in rows} == lines
     page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert all(html.escape(line) in page for line in lines.values())
-    assert "scores as graded: mean 72.5 %" in render_summary(graded)
-    assert "final marks: mean 83.3 %" in render_summary(graded)
+    assert "scores as graded: mean 72.5 %" in render_graded(graded)
+    assert "final marks: mean 83.3 %" in render_graded(graded)
 
 
 def test_a_renamed_file_is_graded_under_its_new_name(tmp_path: Path) -> None:
@@ -405,7 +406,8 @@ def test_a_renamed_file_is_graded_under_its_new_name(tmp_path: Path) -> None:
     assert (tmp_path / "in/ada/deep/Score.py").is_file()  # what was handed in is not changed
     assert (tmp_path / "out/unpacked/renamed/ada/deep/score.py").read_text(encoding="utf-8") == "7"
     again = FakeScheduler(default="failed")
-    grade(course(tmp_path / "in", tmp_path / "out", no_adjustments=True), again)
+    without_line(tmp_path / "out", "adjust")
+    grade(course(tmp_path / "in", tmp_path / "out"), again)
     assert set(again.graded) == {"ada", "bob", "cleo"}
 
 
@@ -491,7 +493,7 @@ def test_who_is_late_is_told_with_the_line_to_write(tmp_path: Path) -> None:
         "marked as late by the platform, no days given: ada (1 day 3 hours); in adjust.yaml: `ada: {days_late: 1.13}`"
     )
     assert graded.book.remarks == (told,)
-    assert told in render_summary(graded)
+    assert told in render_graded(graded)
     assert scores(graded) == {"ada": 10, "bob": 8, "cleo": 10}
     written(tmp_path, "late: {per_day: 10 %}\nstudents:\n  bob: {days_late: 2}\n  ada: {days_late: 1.13}\n")
     graded = grade(wanted)
@@ -519,6 +521,6 @@ def test_who_handed_in_no_program_reads_what_was_found_and_what_to_do(
         (tmp_path / "in" / "ada" / name).write_text("x", encoding="utf-8")
     graded = grade(course(tmp_path / "in", tmp_path / "out"))
     page = (tmp_path / "out/students/ada/feedback.html").read_text(encoding="utf-8")
-    for text in (page, render_summary(graded), (tmp_path / "out/gradebook.csv").read_text(encoding="utf-8")):
+    for text in (page, render_graded(graded), (tmp_path / "out/gradebook.csv").read_text(encoding="utf-8")):
         assert f"expected at least one .py file, {problem}" in text
         assert hint in text

@@ -18,9 +18,9 @@ from class_samples import GRADING, FakeScheduler, course, grade, hand_in, scores
 
 from grader.course.classroom import class_run
 from grader.course.classroom.final_marks import load_mark
-from grader.course.classroom.gradebook import Status, remarks
+from grader.course.classroom.gradebook import Status, row_remarks
 from grader.course.classroom.last_run import read_last_run
-from grader.course.classroom.outputs import Graded, Platforms, render_summary
+from grader.course.classroom.outputs import Graded, Platforms, render_graded
 from grader.course.classroom.store import SEED_KEY, State, Store, open_store
 from grader.course.classroom.watching import Watcher
 from grader.grading.app.seeds import SeedKey
@@ -131,7 +131,7 @@ def test_a_check_without_a_result_leaves_no_final_score(tmp_path: Path) -> None:
     hand_in(tmp_path / "in", bob="unchecked 10")
     row = regraded(tmp_path)[1].book.rows[0]
     assert (row.status, row.adjusted.score) == (Status.UNDECIDED, None)
-    assert remarks(row) == ["not final: the machine was too busy for a check"]
+    assert row_remarks(row) == ["not final: the machine was too busy for a check"]
     assert "t: the machine was too busy for a check" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
 
 
@@ -265,7 +265,7 @@ def test_a_name_in_another_encoding_stops_nobody(tmp_path: Path, layout: str) ->
         marks = [load_mark(path.read_bytes()) for path in sorted((tmp_path / "out" / "students").glob("*/mark.json"))]
         assert [mark and mark.adjusted.score for mark in marks] == [7, 7, 7]
         assert [mark and "\ufffd" in mark.student for mark in marks] == [False, True, False]
-        assert f"written: {tmp_path}/out/gradescope.csv" in render_summary(graded)
+        assert f"written: {tmp_path}/out/gradescope.csv" in render_graded(graded)
 
 
 def test_a_download_with_a_name_in_another_encoding(tmp_path: Path) -> None:
@@ -323,14 +323,14 @@ def test_people_of_one_name_are_told_apart(tmp_path: Path) -> None:
     marks = "  '11': {score: 9, reason: r}\n  '14': {score: 6, reason: r}\n"
     graded = regraded(tmp_path, **decided(tmp_path, marks))[1]
     assert graded.moved == ("Maria Schmidt (11) 4 -> 9", "Zoe 5 -> 6")
-    assert "    Maria Schmidt (11) 4 -> 9" in render_summary(graded)
+    assert "    Maria Schmidt (11) 4 -> 9" in render_graded(graded)
 
 
 def test_who_is_excused_has_not_handed_in_nothing(tmp_path: Path) -> None:
     """Neither on the terminal, nor in the counts, nor on the page."""
     hand_in(tmp_path / "in", **{"14": 5})
     graded = regraded(tmp_path, **decided(tmp_path, "  Eve Ill: {ignore: ill}\n"))[1]
-    summary = render_summary(graded)
+    summary = render_graded(graded)
     assert "nothing handed in (2): Maria Schmidt (11), Maria Schmidt (12)\n" in summary
     assert "excused (1): Eve Ill\n" in summary
     assert (graded.book.count(Status.MISSING), graded.book.count(Status.EXCUSED)) == (2, 1)

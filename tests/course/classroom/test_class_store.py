@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from grader.course.classroom.store import ResultStatus, State, Store, dump, load, open_store
+from grader.course.classroom.store import ResultStatus, State, Store, dump_status, load_status, open_store
 from grader.runtime.model.errors import HarnessError
 
 
@@ -132,21 +132,21 @@ def test_what_cannot_be_written_leaves_the_result_of_before(tmp_path: Path, monk
 @pytest.mark.parametrize("data", [b"", b"{", b"[]", b'{"schema": "grader/batch-result/v1"}', b"\xff", b"[" * 5000])
 def test_a_damaged_standing_is_none(data: bytes) -> None:
     """The submission is then graded again."""
-    assert load(data) is None
+    assert load_status(data) is None
 
 
 def test_a_standing_survives_names_that_are_no_text() -> None:
     """Undecodable bytes in the name of a folder; otherwise it would be graded again for ever."""
     odd = ResultStatus(State.REFUSED, "k", "d", "ad\udcffa", "\u202e\x00\ud800")
-    read = load(dump(odd))
+    read = load_status(dump_status(odd))
     assert read is not None
     assert read.state is State.REFUSED
 
 
 def test_a_standing_of_another_version_is_none() -> None:
     """It is not guessed at."""
-    assert load(dump(status())) == status()
-    assert load(dump(status()).replace(b"batch-result/v1", b"batch-result/v2")) is None
+    assert load_status(dump_status(status())) == status()
+    assert load_status(dump_status(status()).replace(b"batch-result/v1", b"batch-result/v2")) is None
 
 
 @pytest.mark.parametrize("cut", [b"", b'"bo', b"\xff\n", b"[1]\n"])

@@ -12,7 +12,15 @@ import pytest
 from dask_samples import CONDITIONS, graded, task
 
 from grader.course.classroom.local import Attempt, Task, failed_attempt
-from grader.course.classroom.messages import GradingJob, JobResult, Terms, pack, read_collected, unpack, write_answer
+from grader.course.classroom.messages import (
+    GradingJob,
+    JobResult,
+    Terms,
+    pack_message,
+    read_collected,
+    unpack_message,
+    write_answer,
+)
 from grader.course.classroom.receiving import write_task
 from grader.course.classroom.sending import job_for, store_result, terms_of
 from grader.course.classroom.store import State
@@ -24,7 +32,7 @@ def sent(one: Task, wanted: tuple[str] = ("velocity_publisher.py",)) -> tuple[Te
     """Return terms and submission as they come out at the other end."""
     errand = job_for(one, wanted)
     assert isinstance(errand, GradingJob), errand
-    return unpack(pack(terms_of(one)), Terms), unpack(pack(errand), GradingJob)
+    return unpack_message(pack_message(terms_of(one)), Terms), unpack_message(pack_message(errand), GradingJob)
 
 
 def test_a_submission_is_the_same_on_the_other_machine(tmp_path: Path) -> None:
@@ -52,7 +60,7 @@ def test_no_place_of_this_machine_travels(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "bag" / "metadata.yaml").write_text("x", encoding="utf-8")
     one = task(tmp_path, options={"rubrics": (tmp_path / "rubric.yaml",), "bags": (("/scan", tmp_path / "bag"),)})
     terms, errand = sent(one)
-    assert str(tmp_path).encode() not in pack(terms) + pack(errand)
+    assert str(tmp_path).encode() not in pack_message(terms) + pack_message(errand)
     assert terms.conditions.options.rubrics == (Path("rubric.yaml"),)
     assert terms.conditions.options.bags == (("/scan", Path("bag")),)
     assert ([name for name, _ in terms.files], errand.path) == ([b"rubric.yaml", b"bag/metadata.yaml"], b"ada")
@@ -144,7 +152,9 @@ def test_another_rubric_is_no_result(tmp_path: Path) -> None:
     assert "other rubrics" in attempt.status.problem
 
 
-@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack(JobResult("w", b"[]"))])
+@pytest.mark.parametrize(
+    "data", [b"", b"\xc1", b"\x81\xa1a\x01", pickle.dumps({}), pack_message(JobResult("w", b"[]"))]
+)
 def test_nonsense_is_no_result(tmp_path: Path, data: bytes) -> None:
     """Whatever comes back, it is read as data, never run, and never a mark."""
     from grader.course.classroom.sending import answer_in

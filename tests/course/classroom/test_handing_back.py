@@ -12,7 +12,7 @@ from regraded_class import grade, rubric
 
 from grader.cli.main import app
 from grader.course.classroom.final_marks import load_mark
-from grader.course.classroom.outputs import platforms, render_summary
+from grader.course.classroom.outputs import platforms, render_graded
 from grader.course.classroom.uploading.marks import read_marks
 
 ADJUST = """late: {per_day: 10 %}
@@ -124,12 +124,12 @@ def test_a_withheld_criterion_is_not_revealed_by_the_mark(folder: Path) -> None:
     assert "Comment: see me" in text
     assert (
         "note: the exported grades include a criterion that the rubric hides from students (velocity_publisher/rate)"
-        in (render_summary(graded))
+        in (render_graded(graded))
     )
     assert read_marks(folder / "out").withheld == ("velocity_publisher/rate",)
     rubric(folder)
     graded, _, _ = grade(folder, adjustments=folder / "adjust.yaml", platforms=wanted, roster=users)
-    assert "hides from students" not in render_summary(graded)
+    assert "hides from students" not in render_graded(graded)
     assert read_marks(folder / "out").withheld == ()
 
 

@@ -128,7 +128,7 @@ def test_results_are_not_submissions(tmp_path: Path, place: str) -> None:
 
 def test_results_of_another_run_are_not_graded(tmp_path: Path) -> None:
     """They may lie beside the submissions."""
-    class_ = put(tmp_path / "class", "ada/a.py", "old/run.json", "old/students/ada/report.json", "old/assets/x.js")
+    class_ = put(tmp_path / "class", "ada/a.py", "old/class.yaml", "old/students/ada/report.json", "old/assets/x.js")
     intake = found(tmp_path, class_)
     assert names(intake) == ["ada"]
     assert intake.strays == (f"{class_}/old: the results of a class, so it is not graded",)

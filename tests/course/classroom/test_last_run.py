@@ -1,4 +1,4 @@
-"""A class remembers how it was graded: an option that is left out applies again, or is asked for, never dropped."""
+"""A class keeps how it was graded: an option that is not given applies again until its line is deleted."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import json
 import shutil
 from pathlib import Path
 
-import click
 import pytest
-from class_samples import FakeScheduler, hand_in
+from class_samples import FakeScheduler, hand_in, without_line
 from click.testing import CliRunner, Result
 
 from grader.cli import batch
@@ -70,9 +69,9 @@ def test_what_is_left_out_applies_again(scheduler: ClassOfTwo, tmp_path: Path) -
     scheduler.graded.clear()
     again = scheduler.batch()
     assert (marks(), scheduler.graded) == (before, [])
-    said = "--exercise velocity_publisher, --adjust adjust.yaml (1 decision), --roster roster.csv"
-    assert again.stderr.splitlines()[0].startswith("note: as in the last run: ")
-    assert all(part in again.stderr for part in said.split(", "))
+    said = ("--exercise velocity_publisher", "--adjust adjust.yaml", "--roster roster.csv")
+    assert again.stderr.splitlines()[0].startswith("note: from out/class.yaml: ")
+    assert all(part in again.stderr for part in said)
     assert "    Ada 4 -> 8 (score set, the machine was slow)" in again.stdout
     other = scheduler.call(str(tmp_path / "in"), "-o", str(tmp_path / "out"))
     assert (other.exit_code, marks()) == (0, before)
@@ -82,7 +81,7 @@ def test_what_is_left_out_applies_again(scheduler: ClassOfTwo, tmp_path: Path) -
 def test_a_recording_is_found_again_from_another_folder(
     scheduler: ClassOfTwo, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The path behind the topic is kept whole; one that is gone is asked for; no option is both given and left out."""
+    """The path behind the topic is kept whole; one that is gone is asked for."""
     shutil.copytree(builtin_recording(), tmp_path / "drive")
     options = ("--exercise", "odom_subscriber", "--recording", "/odom=drive")
     scheduler.batch(*options)
@@ -96,18 +95,39 @@ def test_a_recording_is_found_again_from_another_folder(
     shutil.rmtree(tmp_path / "drive")
     gone = scheduler.call(*command)
     assert f"--recording: expected {tmp_path}/drive, which the last run used, found nothing there" in gone.output
-    both = [*command, "--no-recording", "--recording", "/odom=b"]
-    assert "exclude each other" in scheduler.call(*both).output
 
 
-def test_an_option_is_left_out_by_name(scheduler: ClassOfTwo) -> None:
-    """Then it stays left out, and every mark that changed is named."""
+def test_an_option_is_left_out_by_deleting_its_line(scheduler: ClassOfTwo) -> None:
+    """Then it stays left out."""
     scheduler.batch(*FIRST)
-    done = scheduler.batch("--no-adjust", "--no-roster")
+    without_line(Path("out"), "adjust")
+    without_line(Path("out"), "roster")
+    done = scheduler.batch()
     assert marks() == {"ada": "4", "bob": "10"}
-    assert "as in the last run: --exercise velocity_publisher;" in done.stderr
+    assert "from out/class.yaml: --exercise velocity_publisher;" in done.stderr
     assert scheduler.batch().stderr.splitlines()[0] == done.stderr.splitlines()[0]
     assert marks() == {"ada": "4", "bob": "10"}
+
+
+def test_an_option_can_be_written_into_the_file(scheduler: ClassOfTwo) -> None:
+    """Numbers and lists are as they are typed; a name that is no option, or no kept one, is refused."""
+    scheduler.batch("--exercise", "velocity_publisher")
+    path = Path("out/class.yaml")
+    before = path.read_text(encoding="utf-8")
+    path.write_text(f"{before}seed: 7\nstandalone: true\nmoodle: roster.csv\n", encoding="utf-8")
+    done = scheduler.batch()
+    assert all(part in done.stderr for part in ("--seed 7", "--standalone", "--moodle roster.csv"))
+    assert Path("out/moodle.csv").is_file()
+    assert "standalone: true\n" in path.read_text(encoding="utf-8")
+    for line, message in (
+        ("jobs: 3", "out/class.yaml: expected one of adjust, all, canvas"),
+        ("roster: true", "out/class.yaml: roster: expected one value"),
+        ("roster: [a.csv, b.csv]", "out/class.yaml: roster: expected one value"),
+        ("standalone: 3", "out/class.yaml: standalone: expected true"),
+        ("rubric: []", "out/class.yaml: rubric: expected values"),
+    ):
+        path.write_text(f"{before}{line}\n", encoding="utf-8")
+        assert message in scheduler.batch(code=2).stderr
 
 
 def test_a_changed_mark_is_named_whatever_changed_it(scheduler: ClassOfTwo) -> None:
@@ -118,12 +138,12 @@ def test_a_changed_mark_is_named_whatever_changed_it(scheduler: ClassOfTwo) -> N
     assert "final marks that differ" not in scheduler.batch().stdout
 
 
-def test_a_changed_option_is_told(scheduler: ClassOfTwo) -> None:
-    """With what the last run had."""
+def test_an_option_that_is_given_replaces_the_kept_one(scheduler: ClassOfTwo) -> None:
+    """For the following runs, too."""
     scheduler.batch(*FIRST)
-    done = scheduler.batch("--exercise", "odom_subscriber")
-    assert "note: --exercise odom_subscriber; the last run had --exercise velocity_publisher" in done.stderr
+    scheduler.batch("--exercise", "odom_subscriber")
     assert [e for e, _ in scheduler.tasks["bob"].conditions.rubrics] == ["odom_subscriber"]
+    assert "--exercise odom_subscriber," in scheduler.batch().stderr
 
 
 @pytest.mark.parametrize("file", ["adjust.yaml", "roster.csv"])
@@ -134,30 +154,27 @@ def test_a_file_that_is_gone_is_asked_for(file: str, scheduler: ClassOfTwo) -> N
     Path(file).unlink()
     done = scheduler.batch(code=2)
     option = {"adjust.yaml": "adjust", "roster.csv": "roster"}[file]
-    holds = " (1 decision)" if option == "adjust" else ""
-    assert f"--{option}: expected {Path(file).resolve()}{holds}, which the last run used, found nothing" in done.stderr
-    assert f"hint: give it again with --{option}, or leave it out with --no-{option}" in done.stderr
+    assert f"--{option}: expected {Path(file).resolve()}, which the last run used, found nothing" in done.stderr
+    assert f"hint: give it again with --{option}, or delete the line to leave it out" in done.stderr
     assert Path("out/gradebook.csv").read_bytes() == before
-    scheduler.batch(f"--no-{option}")
+    without_line(Path("out"), option)
+    scheduler.batch()
 
 
 def test_the_file_in_the_results_is_asked_for_too(scheduler: ClassOfTwo) -> None:
-    """It applies without being named, so it must not stop applying without a word; --no-adjust leaves it out."""
+    """It applies without being named, so it must not stop applying without a word."""
     Path("out").mkdir()
     kept = Path("out/adjust.yaml")
     kept.write_text(DECISIONS, encoding="utf-8")
     scheduler.batch("--exercise", "velocity_publisher")
     assert marks()["ada"] == "8"
-    scheduler.batch("--no-adjust")
-    assert marks()["ada"] == "4"
-    scheduler.batch()
-    assert marks()["ada"] == "8"
     kept.unlink()
     done = scheduler.batch(code=2)
-    assert (
-        f"--adjust: expected the 1 decision of {kept.resolve()}, which the last run applied, found none" in done.stderr
-    )
+    assert f"--adjust: expected {kept.resolve()}, which the last run used, found nothing there" in done.stderr
     assert marks()["ada"] == "8"
+    without_line(Path("out"), "adjust")
+    scheduler.batch()
+    assert marks()["ada"] == "4"
 
 
 def test_two_files_of_decisions_are_not_mixed_up(scheduler: ClassOfTwo) -> None:
@@ -180,12 +197,6 @@ def test_options_that_exclude_each_other_are_not_both_repeated(scheduler: ClassO
     assert ("--seed 7" in said, "--pattern" in said) == (False, False)
 
 
-def test_an_option_and_its_opposite_are_refused(scheduler: ClassOfTwo) -> None:
-    """Which one was meant is not guessed."""
-    done = scheduler.batch("--adjust", "adjust.yaml", "--no-adjust", code=2)
-    assert "--adjust and --no-adjust exclude each other" in done.stderr
-
-
 def test_a_mistake_leaves_what_is_remembered(scheduler: ClassOfTwo) -> None:
     """A run that grades nothing is not the last run."""
     scheduler.batch(*FIRST)
@@ -206,27 +217,25 @@ def test_exports_follow_the_marks(scheduler: ClassOfTwo) -> None:
     assert "ada,6," in Path("out/moodle.csv").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", '{"schema": "grader/batch-run/v9", "options": {}}', '{"options": 3}'])
-def test_a_damaged_record_is_not_taken_for_an_empty_one(text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("text", ["", "[]", "{", "roster: {a: b}\n", "roster: [[a]]\n", "roster:\n", "\udcf3"])
+def test_a_damaged_file_is_not_taken_for_an_empty_one(text: str, tmp_path: Path) -> None:
     """Else everything that it held would be dropped."""
-    (tmp_path / "run.json").write_text(text, encoding="utf-8")
-    with pytest.raises(ClassError, match=r"run\.json: expected the options of the last run, found a damaged file"):
+    (tmp_path / "class.yaml").write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(ClassError, match=r"class\.yaml: expected the options of this class, one a line, found"):
         read_last_run(tmp_path)
 
 
-def test_a_record_is_read_as_it_was_written(tmp_path: Path) -> None:
-    """And a folder without one remembers nothing."""
-    last = LastRun({"rubric": ("/a.yaml", "/b.yaml"), "all": ()}, "/adjust.yaml", 3)
-    (tmp_path / "run.json").write_bytes(dump_last_run(last))
+def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
+    """Whatever the paths are; and a folder without one keeps nothing."""
+    options = {"rubric": ("/a.yaml", "/b: 'c'\n\x80\U0001f600.yaml"), "all": (), "seed": ("07",), "title": ('"#',)}
+    last = LastRun(options, ("/in", "/latin-\udcf3"))
+    (tmp_path / "class.yaml").write_bytes(dump_last_run(last))
     assert read_last_run(tmp_path) == last
     assert read_last_run(tmp_path / "none") == LastRun()
 
 
 def test_every_option_is_remembered_or_of_one_run() -> None:
-    """A new option has to be put into one of the two lists; every remembered one can be left out."""
+    """A new option has to be put into one of the two lists."""
     exposed = {param.name for param in batch.command.params if param.expose_value}
     assert exposed == set(KEPT) | OF_ONE_RUN
     assert not set(KEPT) & OF_ONE_RUN
-    names = {name for param in batch.command.params for name in param.opts}
-    kept = [param for param in batch.command.params if param.name in KEPT]
-    assert all(isinstance(param, click.Option) and f"--no-{param.opts[0][2:]}" in names for param in kept)

@@ -15,7 +15,7 @@ import pytest
 from kept_runs import RUBRICS
 from regraded_class import RATES, grade, rubric
 
-from grader.course.classroom.outputs import render_summary
+from grader.course.classroom.outputs import render_graded
 from grader.course.classroom.store import BEFORE, ResultStatus, State
 from grader.course.classroom.watching import Watcher
 from grader.grading.app.kept_recordings import PlannedRun, recorded_alike
@@ -57,7 +57,7 @@ def test_nothing_runs_where_only_judging_changed(folder: Path) -> None:
     assert lines[0] == "to grade: 3 (3 of them from kept recordings)"
     scores = {row["submission"]: (row["score"], row["max_score"]) for row in table(folder / "out/gradebook.csv")}
     assert scores == {"ada": ("34", "34"), "bob": ("24", "34"), "cleo": ("34", "34")}
-    text = render_summary(graded)
+    text = render_graded(graded)
     assert text.startswith(
         "graded now: 3 (3 from kept recordings, 0 run), done before: 0\nchanged: 3 of 3: 1 up, 0 down"
     )

@@ -13,7 +13,7 @@ import pytest
 
 import grader.course.mutation
 from grader.course.mutation.results import Fate, SelftestResult, Trial, TrialResult, one_line_change, unified_change
-from grader.course.mutation.showing import render_results, results_to_json
+from grader.course.mutation.showing import render_selftest, selftest_to_json
 from grader.grading.model.exercise import Outcome
 
 MET, PARTLY, NOT_MET, BLOCKED, UNDECIDED = Outcome
@@ -102,7 +102,7 @@ def test_a_criterion_that_nothing_turns_may_be_explained() -> None:
     """The text shows why."""
     found = replace(result(), mutants=(trial(1, rate=NOT_MET),), unturned={"speed": "it is the last"})
     assert found.passed
-    assert "speed detects no mutant because it is the last" in render_results([found], width=80, colour=False)
+    assert "speed detects no mutant because it is the last" in render_selftest([found], width=80, colour=False)
 
 
 def test_only_a_named_criterion_kills_as_expected() -> None:
@@ -131,10 +131,10 @@ def test_a_change_is_shown_as_a_diff() -> None:
     """With a line around it, so that its place can be seen."""
     diff = unified_change("a\nb\nc\nd\n", "a\nb\nx\nd\n")
     assert diff == "@@ -2,3 +2,3 @@\n b\n-c\n+x\n d"
-    text = render_results([result(trial(3, diff=diff))], width=80, colour=False)
+    text = render_selftest([result(trial(3, diff=diff))], width=80, colour=False)
     assert "    @@ -2,3 +2,3 @@\n     b\n    -c\n    +x\n     d\n" in text
     long = "\n".join(f"+{n}" for n in range(50))
-    assert "    ... and 20 more lines\n" in render_results([result(trial(3, diff=long))], width=80, colour=False)
+    assert "    ... and 20 more lines\n" in render_selftest([result(trial(3, diff=long))], width=80, colour=False)
 
 
 def everything() -> SelftestResult:
@@ -152,7 +152,7 @@ def everything() -> SelftestResult:
 
 def test_the_text_names_every_kind() -> None:
     """Survivors with their change, explanations, other killers, what is undecided, and idle patterns."""
-    text = render_results([everything()], width=100, colour=False)
+    text = render_selftest([everything()], width=100, colour=False)
     assert "fan (r.yaml): HAS HOLES" in text
     assert "6 tried, 3 detected, 1 survived, 1 more survived for a reason in the notes, 1 undecided" in text
     for part in ("because the same", "expected rate", "    -a\n    +5\n", "because asked for", "`x` explains nothing"):
@@ -165,7 +165,7 @@ def test_the_text_names_every_kind() -> None:
 
 def test_without_a_right_reference_the_text_says_why_nothing_was_tried() -> None:
     """And which criteria it lost."""
-    text = render_results([replace(result(reference=trial_result(rate=PARTLY)), mutants=())], width=80, colour=False)
+    text = render_selftest([replace(result(reference=trial_result(rate=PARTLY)), mutants=())], width=80, colour=False)
     assert "none tried" in text
     assert "rate: rate is partly" in text
 
@@ -174,7 +174,7 @@ def test_the_json_fits_its_schema() -> None:
     """Also with hostile text and with nothing at all."""
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     for found in (everything(), replace(result(), mutants=(), template=None, baseline=None)):
-        data = json.loads(results_to_json([found]))
+        data = json.loads(selftest_to_json([found]))
         jsonschema.Draft202012Validator(SCHEMA).validate(data)
     assert data["passed"] is False
     assert data["rubrics"][0]["never_turned"] == ["rate", "speed"]

@@ -10,7 +10,7 @@ import pytest
 
 from grader.course.mutation.explained import Explained, read_explained
 from grader.course.mutation.results import SelftestResult, Trial, TrialResult
-from grader.course.mutation.writing import noted, pattern_of
+from grader.course.mutation.writing import noted, trial_pattern
 from grader.grading.model.exercise import Outcome
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.loader import read_rubric
@@ -106,5 +106,5 @@ def test_nothing_to_explain_changes_nothing() -> None:
 def test_a_pattern_fits_what_it_was_made_of(tmp_path: Path, id_: str) -> None:
     """Whatever signs it holds."""
     made = Trial(id_, "a.py", "text", "", FULL)
-    notes = f"schema: grader/selftest-notes/v1\nsurvivors:\n  - {{mutants: '{pattern_of(made)}', because: x}}\n"
+    notes = f"schema: grader/selftest-notes/v1\nsurvivors:\n  - {{mutants: '{trial_pattern(made)}', because: x}}\n"
     assert read(tmp_path, notes).survivors[0].fits(id_)

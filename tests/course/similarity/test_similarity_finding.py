@@ -20,8 +20,8 @@ from grader.course.similarity.finding import (
     COMMON_MOST,
     MAX_BYTES,
     find_similar,
-    read_given,
-    read_programs,
+    read_compared,
+    read_templates,
 )
 from grader.course.similarity.library import Handed, Similar
 from grader.runtime.model.errors import ClassError
@@ -33,7 +33,7 @@ STRANGERS = ("odom_chinese", "odom_csv", "odom_distance", "odom_globals_spin_onc
 
 def strangers() -> list[Handed]:
     """Return a class in which everybody worked alone."""
-    return [Handed(name, name, *read_programs(folder_of(f"correct/{name}"))) for name in STRANGERS]
+    return [Handed(name, name, *read_compared(folder_of(f"correct/{name}"))) for name in STRANGERS]
 
 
 def text_of(name: str) -> str:
@@ -105,8 +105,8 @@ def test_code_that_was_handed_out_does_not_count() -> None:
 def test_only_encodings_that_take_linear_time_are_decoded(encoding: str) -> None:
     """Any other text is compared as UTF-8."""
     written = f"# coding: {encoding}\nname = 'ü-ß'\n"
-    assert finding.text_of(written.encode()) == written
-    assert finding.text_of("# coding: latin-1\nname = 'ü'\n".encode("latin-1")).endswith("name = 'ü'\n")
+    assert finding.decoded_text(written.encode()) == written
+    assert finding.decoded_text("# coding: latin-1\nname = 'ü'\n".encode("latin-1")).endswith("name = 'ü'\n")
 
 
 OBVIOUS = {
@@ -128,7 +128,7 @@ def test_who_fills_the_gaps_of_a_template_in_the_obvious_way_is_not_listed() -> 
         filled = "\n".join(("    " if "def " in ln or ln[:1] == " " else "        ") + ln for ln in lines.split("|"))
         group.append(handed(name, f"{before}{filled}\n\n\n{after}"))
     compile(group[0].programs[0].text, "ada", "exec")
-    assert pairs(find_similar(group, read_given([ROOT / "student_template"]))) == []
+    assert pairs(find_similar(group, read_templates([ROOT / "student_template"]))) == []
 
 
 def test_what_many_write_does_not_count() -> None:
@@ -250,13 +250,13 @@ def test_a_file_that_takes_too_long_is_named() -> None:
 
 def test_a_submission_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     """So are folders without any Python."""
-    assert read_programs(tmp_path / "gone") == ((), ("it cannot be read",))
+    assert read_compared(tmp_path / "gone") == ((), ("it cannot be read",))
     (tmp_path / "notes.txt").write_text("x")
-    assert read_programs(tmp_path)[0] == ()
+    assert read_compared(tmp_path)[0] == ()
 
 
 def test_given_code_has_to_be_there(tmp_path: Path) -> None:
     """A folder named by mistake would take out nothing."""
     with pytest.raises(ClassError, match="expected a folder with the Python files"):
-        read_given([tmp_path])
-    assert {program.name for program in read_given([ROOT / "student_template"])} >= {FILE, "fan_controller.py"}
+        read_templates([tmp_path])
+    assert {program.name for program in read_templates([ROOT / "student_template"])} >= {FILE, "fan_controller.py"}

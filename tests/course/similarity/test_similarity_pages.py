@@ -13,7 +13,14 @@ from copies import handed
 
 from grader.course.similarity import pages
 from grader.course.similarity.library import ComparedProgram, Handed, Likeness, Pair, SameText, Side, Similar
-from grader.course.similarity.pages import ShownLine, lines_of, render_overview, render_pair, render_table, report_of
+from grader.course.similarity.pages import (
+    ShownLine,
+    marked_lines,
+    render_overview,
+    render_pair,
+    render_table,
+    report_of,
+)
 
 EVIL = "<script>document.title='owned'</script>\u202e\x1b[31m=cmd|'/C calc'!A0\" onmouseover=\"alert(1)"
 
@@ -90,7 +97,7 @@ def test_the_marked_lines_are_those_that_are_alike() -> None:
 def test_a_long_file_is_shown_around_what_is_alike() -> None:
     """The rest is counted."""
     text = "".join(f"x{k} = {k}\n" for k in range(1, 1001))
-    lines = lines_of(Side(ComparedProgram("a.py", text, ""), 1.0, (500,)))
+    lines = marked_lines(Side(ComparedProgram("a.py", text, ""), 1.0, (500,)))
     assert lines[0] == ShownLine(0, "496 lines not shown")
     assert [line.number for line in lines if line.alike] == [500]
     assert [line.number for line in lines[1:-1]] == list(range(497, 504))
@@ -100,9 +107,9 @@ def test_a_long_file_is_shown_around_what_is_alike() -> None:
 def test_no_file_makes_a_huge_page() -> None:
     """However much of it is alike."""
     text = "x\n" * 30_000
-    lines = lines_of(Side(ComparedProgram("a.py", text, ""), 1.0, tuple(range(1, 30_001))))
+    lines = marked_lines(Side(ComparedProgram("a.py", text, ""), 1.0, tuple(range(1, 30_001))))
     assert len(lines) == pages.MOST_LINES + 1
-    assert len(lines_of(Side(ComparedProgram("a.py", "y" * 60_000, ""), 1.0, (1,)))[0].text) < 500
+    assert len(marked_lines(Side(ComparedProgram("a.py", "y" * 60_000, ""), 1.0, (1,)))[0].text) < 500
 
 
 def test_pairs_without_a_page_are_in_the_table() -> None:

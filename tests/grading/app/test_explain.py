@@ -12,7 +12,7 @@ from kept_runs import kept_run, velocity_run, velocity_trace
 from places import ROOT
 
 from grader.cli import main
-from grader.grading.app.explain import explain
+from grader.grading.app.explain import explain_name
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.hint_rules import explain_rules, try_rules
 from grader.grading.app.request import GradeRequest
@@ -34,7 +34,7 @@ def grade(*words: str) -> Result:
 @pytest.mark.parametrize(("exercise", "criterion"), CRITERIA, ids=[c for _, c in CRITERIA])
 def test_every_criterion_is_explained(exercise: str, criterion: str) -> None:
     """What is asked, how it is measured, every parameter's value and meaning, and where the chapter asks for it."""
-    (found,) = explain(f"{exercise}/{criterion}")
+    (found,) = explain_name(f"{exercise}/{criterion}")
     assert isinstance(found, CriterionExplanation)
     assert found.asks
     assert found.situation
@@ -49,7 +49,7 @@ def test_every_criterion_is_explained(exercise: str, criterion: str) -> None:
 @pytest.mark.parametrize("name", CHECKS)
 def test_every_check_is_explained(name: str) -> None:
     """Its manual holds a sentence, and one for each parameter; who uses it is told."""
-    found = explain(name)[0]
+    found = explain_name(name)[0]
     assert found.asks.endswith(".")
     assert all(parameter.meaning for parameter in found.parameters)
     assert grade(name).exit_code == 0
@@ -65,9 +65,9 @@ def test_the_tolerance_is_that_of_the_rubric(tmp_path: Path) -> None:
 
 def test_a_check_shows_what_a_rubric_has_to_give() -> None:
     """Parameters with a default show it, the others that there is none."""
-    found = {p.name: (p.value, p.required) for p in explain("log_period")[0].parameters if p.name != "topic"}
+    found = {p.name: (p.value, p.required) for p in explain_name("log_period")[0].parameters if p.name != "topic"}
     assert found["tolerance"] == ("0.1", False)
-    (check,) = explain("topic_rate")
+    (check,) = explain_name("topic_rate")
     assert {p.name: p.required for p in check.parameters} == {
         "topic": True,
         "rate": True,
@@ -97,7 +97,7 @@ def test_a_check_shows_what_a_rubric_has_to_give() -> None:
 def test_an_unknown_name_is_answered_with_the_nearest(typed: str, offered: str) -> None:
     """Exit code 2; where nothing is near, all names are told."""
     with pytest.raises(GraderError) as error:
-        explain(typed)
+        explain_name(typed)
     assert offered in error.value.hint
     assert grade(typed).exit_code == 2
 

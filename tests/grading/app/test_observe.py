@@ -13,7 +13,7 @@ from tiers import each, more
 
 from grader.grading.app import observe as observing
 from grader.grading.app.inputs import read_simulations
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.grading.app.programs import find_targets, stage
 from grader.grading.judging.summary import summarise
 from grader.grading.model.report import Summary
@@ -228,7 +228,7 @@ def test_a_file_of_a_package_may_import_the_package(tmp_path: Path) -> None:
         "    rclpy.init()\n    node = rclpy.create_node('speaker')\n    node.get_logger().info(TEXT)\n"
         "    rclpy.spin(node)\n\n\nif __name__ == '__main__':\n    main()\n"
     )
-    summary = observe(ObserveRequest((node,), NS_PER_S, clock="virtual"), lambda _: None)
+    summary = observe_programs(ObserveRequest((node,), NS_PER_S, clock="virtual"), lambda _: None)
     assert ([r.text for r in summary.records], summary.faults) == (["from the package"], ())
 
 
@@ -239,7 +239,9 @@ def test_a_traceback_begins_with_the_program(tmp_path: Path) -> None:
     for text, first in (("import rclpy\n1 / 0\n", "node.py"), ("import rclpy\nimport other\n", "node.py")):
         file.write_text(text)
         (tmp_path / "other.py").write_text("{}['x']\n")
-        lines = [o.text for o in observe(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None).lines]
+        lines = [
+            o.text for o in observe_programs(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None).lines
+        ]
         assert lines[:2] == ["Traceback (most recent call last):", f'  File "{first}", line 2, in <module>']
         assert not any("grader" in line for line in lines)
 
@@ -254,7 +256,7 @@ def test_a_class_that_needs_arguments_is_not_started(tmp_path: Path, clock: str)
         "from rclpy.node import Node\nclass Relay(Node):\n"
         "    def __init__(self, robot):\n        super().__init__(f'relay_{robot}')\n"
     )
-    summary = observe(ObserveRequest((file,), NS_PER_S, clock=clock), lambda _: None)
+    summary = observe_programs(ObserveRequest((file,), NS_PER_S, clock=clock), lambda _: None)
     assert [fault.text for fault in summary.faults] == ["exited with code 0"]
     assert [note.split(",")[0] for note in summary.notes] == ["relay.py: nothing starts Relay"]
 
@@ -295,7 +297,7 @@ def test_the_packages_beside_one_are_there(tmp_path: Path, above: str, target: s
         "def generate_launch_description():\n"
         "    return LaunchDescription([Node(package='two', executable='speaker')])\n"
     )
-    summary = observe(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
+    summary = observe_programs(ObserveRequest((tmp_path / above / target,), NS_PER_S, clock="virtual"), lambda _: None)
     assert [r.text for r in summary.records] == ["from the other package"]
 
 
@@ -320,7 +322,9 @@ def test_an_import_from_above_a_package_is_told_with_its_folder(tmp_path: Path) 
     (tmp_path / "talk").mkdir()
     (tmp_path / "talk" / "__init__.py").write_text("from ..words import WORD\n")
     (tmp_path / "talk" / "say.py").touch()
-    (fault,) = observe(ObserveRequest((tmp_path / "talk" / "say.py",), NS_PER_S, clock="virtual"), quiet).faults
+    (fault,) = observe_programs(
+        ObserveRequest((tmp_path / "talk" / "say.py",), NS_PER_S, clock="virtual"), quiet
+    ).faults
     assert (fault.file, fault.line) == ("talk/__init__.py", 1)
     assert fault.text.startswith("ImportError: attempted relative import beyond top-level package")
 
@@ -361,7 +365,7 @@ if __name__ == "__main__":
 def test_a_class_may_hide_what_rclpy_does_not_need(tmp_path: Path, clock: str) -> None:
     """It works in plain Python, so the host must not need the hidden names either."""
     (tmp_path / "battery.py").write_text(HIDES)
-    summary = observe(ObserveRequest((tmp_path / "battery.py",), NS_PER_S, clock=clock), quiet)
+    summary = observe_programs(ObserveRequest((tmp_path / "battery.py",), NS_PER_S, clock=clock), quiet)
     assert (summary.faults, [r.text for r in summary.records]) == ((), ["heard 85.0"])
     assert summary.nodes == ("/battery",)
 
@@ -404,7 +408,9 @@ def test_a_node_finds_the_folders_that_its_launch_file_has_found(tmp_path: Path)
     setup = tmp_path / "finds" / "setup.py"
     setup.write_text(setup.read_text().replace("setup(", 'setup(data_files=[("share/finds", ["package.xml"])], ', 1))
     (tmp_path / "finds" / "finds.launch.py").write_text(FINDS)
-    summary = observe(ObserveRequest((tmp_path / "finds" / "finds.launch.py",), NS_PER_S, clock="virtual"), quiet)
+    summary = observe_programs(
+        ObserveRequest((tmp_path / "finds" / "finds.launch.py",), NS_PER_S, clock="virtual"), quiet
+    )
     if summary.isolation not in (ROOT_NAME, USER_NAME):
         pytest.skip("processes have no view of files of their own here")
     assert [r.text for r in summary.records] == [*["True"] * 4, "False", "True", "wrote 3 beside"]
@@ -447,7 +453,9 @@ def test_a_message_package_is_found_wherever_it_lies(tmp_path: Path, package: st
         for number in range(8):
             with (tmp_path / package / "meshes" / f"{number}.stl").open("wb") as mesh:
                 mesh.truncate(MAX_FILE_BYTES - 1)
-    summary = observe(ObserveRequest((tmp_path / package / "talk_py" / "talker",), NS_PER_S, clock="virtual"), quiet)
+    summary = observe_programs(
+        ObserveRequest((tmp_path / package / "talk_py" / "talker",), NS_PER_S, clock="virtual"), quiet
+    )
     assert summary.faults == ()
     assert [topic.texts["text"][0] for topic in summary.topics] == [("hi",)]
     taken = "the workspace is too large to be copied: taken are the packages talk_interfaces, talk_py"
@@ -462,7 +470,7 @@ def test_a_package_that_colcon_ignores_is_named(tmp_path: Path, named: str, igno
     for name in ("talk_interfaces", "unused_interfaces"):
         an_interface_package(tmp_path / "src" / name)
         (tmp_path / "src" / name / "COLCON_IGNORE").touch()
-    summary = observe(ObserveRequest((tmp_path / named,), NS_PER_S, clock="virtual"), quiet)
+    summary = observe_programs(ObserveRequest((tmp_path / named,), NS_PER_S, clock="virtual"), quiet)
     said = f"the package talk_interfaces was left out, as colcon does: there is a file {ignored}/COLCON_IGNORE"
     assert [note for note in summary.notes if "COLCON_IGNORE" in note] == [said]
     assert not any("rcl_interfaces" in hint for hint in summary.hints)
@@ -485,7 +493,7 @@ def test_both_clocks_show_services_clients_and_parameters(tmp_path: Path) -> Non
     """The same ones."""
     (tmp_path / "waits.py").write_text(WAITS)
     requests = [ObserveRequest((tmp_path / "waits.py",), 2 * NS_PER_S, clock=clock) for clock in ("virtual", "wall")]
-    virtual, wall = ({(o.kind, o.name, o.detail) for o in observe(one, quiet).offers} for one in requests)
+    virtual, wall = ({(o.kind, o.name, o.detail) for o in observe_programs(one, quiet).offers} for one in requests)
     assert (
         virtual
         == wall
@@ -515,7 +523,7 @@ def test_a_built_in_simulation_brings_its_types(tmp_path: Path) -> None:
     (tmp_path / "waits.py").write_text(WAITS.replace("/nobody", "/clear"))
     simulations = read_simulations(["turtle"])
     request = ObserveRequest((tmp_path / "waits.py",), NS_PER_S, clock="virtual", simulations=simulations)
-    assert observe(request, quiet).nodes == ("/ns/waiter",)
+    assert observe_programs(request, quiet).nodes == ("/ns/waiter",)
 
 
 class Recorder:
@@ -624,7 +632,7 @@ def test_what_a_launch_file_prints_is_shown(tmp_path: Path, *, fails: bool) -> N
     (tmp_path / "needs.launch.py").write_text(text)
     arguments = () if fails else (("kind", "five"),)
     request = ObserveRequest((tmp_path / "needs.launch.py",), NS_PER_S, clock="virtual", launch_arguments=arguments)
-    summary = observe(request, quiet)
+    summary = observe_programs(request, quiet)
     assert [(line.process, line.text) for line in summary.lines] == [
         (f"needs.launch.py{'' if fails else ' (evaluation)'}", text) for text in ("at the top", "here")
     ]
@@ -639,7 +647,7 @@ def test_a_launch_file_gets_its_arguments(tmp_path: Path, given: tuple[tuple[str
     (tmp_path / "waits.py").write_text(WAITS)
     (tmp_path / "needs.launch.py").write_text(NEEDS)
     request = ObserveRequest((tmp_path / "needs.launch.py",), NS_PER_S, clock="virtual", launch_arguments=given)
-    summary = observe(request, quiet)
+    summary = observe_programs(request, quiet)
     assert summary.nodes == (("/ns/five",) if given else ())
     assert summary.hints == (() if given else ("give it a value: --launch-argument kind:=VALUE",))
 
@@ -650,7 +658,7 @@ def test_the_file_that_is_named_runs(tmp_path: Path, room: str) -> None:
     """A package may have two files of a name."""
     a_package(tmp_path, "rooms", hall__main=LOGS.format("", "'hall'"), kitchen__main=LOGS.format("", "'kitchen'"))
     file = tmp_path / "rooms" / "rooms" / room / "main.py"
-    summary = observe(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None)
+    summary = observe_programs(ObserveRequest((file,), NS_PER_S, clock="virtual"), lambda _: None)
     assert [r.text for r in summary.records] == [room]
     assert [note for note in summary.notes if "not graded" in note] == []
 
@@ -674,7 +682,7 @@ TARGETS = {
 @pytest.mark.parametrize(("path", "processes", "nodes"), each(TARGETS.values(), 3), ids=TARGETS)
 def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tuple[str, ...]) -> None:
     """Every layout that is graded, and the text says what ran."""
-    summary = observe(ObserveRequest((path,), 2 * NS_PER_S, clock="virtual"), lambda _: None)
+    summary = observe_programs(ObserveRequest((path,), 2 * NS_PER_S, clock="virtual"), lambda _: None)
     assert (summary.processes, summary.nodes, summary.faults) == (processes, nodes, ())
     assert render_summary(summary).startswith(f"{', '.join(processes)}: 2.0 s on the virtual clock\n")
 
@@ -690,7 +698,7 @@ def test_packages_are_observed(path: Path, processes: tuple[str, ...], nodes: tu
 def test_what_cannot_be_observed_is_told_what_is_there(path: Path, said: str) -> None:
     """Nothing is started."""
     with pytest.raises(SubmissionError) as raised:
-        observe(ObserveRequest((path,), NS_PER_S), lambda _: None)
+        observe_programs(ObserveRequest((path,), NS_PER_S), lambda _: None)
     assert raised.value.message == f"{path}: {said}"
 
 
@@ -734,7 +742,7 @@ def seen(folder: Path, clock: str = "virtual", **files: str) -> Summary:
     for name, text in files.items():
         (folder / f"{name}.py").write_text(text)
     paths = tuple(folder / f"{name}.py" for name in files)
-    return observe(ObserveRequest(paths, NS_PER_S, clock=clock), lambda _: None)
+    return observe_programs(ObserveRequest(paths, NS_PER_S, clock=clock), lambda _: None)
 
 
 @pytest.mark.ros
@@ -929,5 +937,5 @@ def test_output_that_only_looks_like_a_traceback_stays() -> None:
 def test_services_of_others_are_in_the_graph(clock: str) -> None:
     """Also of programs without a topic."""
     files = (REPORTED / "graph_server.py", REPORTED / "graph_asks.py")
-    text = render_summary(observe(ObserveRequest(files, 2 * NS_PER_S, clock=clock), lambda _: None))
+    text = render_summary(observe_programs(ObserveRequest(files, 2 * NS_PER_S, clock=clock), lambda _: None))
     assert "Graph:\n  /asks ┄┄/ask┄┄▶ /server\n" in text

@@ -12,7 +12,7 @@ from decided import grade_until_decided
 from places import REPORTED
 from tiers import LONG, NIGHTLY, each, more
 
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.grading.app.programs import find_targets, stage
 from grader.grading.app.request import GradeRequest
 from grader.grading.submissions.projects import read_projects
@@ -448,7 +448,7 @@ def test_programs_of_cmake_packages_run(tmp_path: Path, shape: str, clock: str) 
     """As `ros2 run` starts them: a program that is installed as it is, as a script."""
     files, programs = SHAPES[shape]
     tmp_path.chmod(0o755)
-    summary = observe(ObserveRequest((write(files, tmp_path / "ws"),), NS_PER_S, clock=clock), lambda _: None)
+    summary = observe_programs(ObserveRequest((write(files, tmp_path / "ws"),), NS_PER_S, clock=clock), lambda _: None)
     assert sorted(record.text for record in summary.records) == sorted(programs)
     assert summary.faults == ()
 
@@ -459,7 +459,9 @@ def test_more_programs_than_a_scenario_has_by_default_are_all_heard(tmp_path: Pa
     """A limit for stray participants does not count the programs themselves."""
     files = {f"n{n}.py": NODE.format(name=f"n{n}", text=f"n{n}") for n in range(18)}
     write(files, tmp_path)
-    summary = observe(ObserveRequest(tuple(tmp_path / n for n in files), NS_PER_S, clock="virtual"), lambda _: None)
+    summary = observe_programs(
+        ObserveRequest(tuple(tmp_path / n for n in files), NS_PER_S, clock="virtual"), lambda _: None
+    )
     assert sorted(record.text for record in summary.records) == sorted(f"n{n}" for n in range(18))
     assert summary.notes == ()
 

@@ -50,7 +50,7 @@ def test_the_same_rubric_gives_the_same_report(tmp_path: Path, rate_hz: int, pic
     first = judge_run([velocity_exercise()], run, pictures=pictures)
     kept_run(tmp_path, run)
     how = rejudge.judgement((), (), pictures=pictures)
-    again = rejudge.rejudge(open_evidence(tmp_path), how)
+    again = rejudge.rejudge_evidence(open_evidence(tmp_path), how)
     assert again.reproduce.command == ("grade", "class/ada", "--seed", "7")
     assert dataclasses.replace(again, reproduce=first.reproduce) == first
 
@@ -62,7 +62,7 @@ def test_the_report_is_printed_and_written_as_by_grading(tmp_path: Path) -> None
     text = grade(tmp_path / "e")
     assert (text.exit_code, "20 of 30 points" in text.output) == (1, True)
     shown = grade(tmp_path / "e", "--json", "-o", f"text={tmp_path / 'r.txt'}", "--min-score", 60)
-    report = rejudge.rejudge(open_evidence(tmp_path / "e"), rejudge.judgement((), ()))
+    report = rejudge.rejudge_evidence(open_evidence(tmp_path / "e"), rejudge.judgement((), ()))
     assert (shown.exit_code, shown.stdout) == (0, dumps(report))
     assert "20 of 30 points" in (tmp_path / "r.txt").read_text(encoding="utf-8")
 

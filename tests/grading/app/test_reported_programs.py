@@ -13,7 +13,7 @@ from decided import grade_until_decided
 from places import GRADE, REPORTED, ROOT
 from tiers import each, more
 
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
 from grader.runtime.model.quantities import NS_PER_S
@@ -85,7 +85,7 @@ def test_one_processor_is_as_good_as_several(tmp_path: Path) -> None:
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_a_service_in_a_timer_is_answered(clock: str) -> None:
     """Once a second, by other threads of the same executor."""
-    summary = observe(
+    summary = observe_programs(
         ObserveRequest((REPORTED / "one_cpu/service_in_timer.py",), 6 * NS_PER_S, clock=clock), lambda _: None
     )
     texts = [record.text for record in summary.records]
@@ -97,7 +97,7 @@ def test_a_service_in_a_timer_is_answered(clock: str) -> None:
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_there_is_a_user(clock: str) -> None:
     """By the variable, and by the user of the process."""
-    summary = observe(ObserveRequest((REPORTED / "user_name.py",), 5 * NS_PER_S, clock=clock), lambda _: None)
+    summary = observe_programs(ObserveRequest((REPORTED / "user_name.py",), 5 * NS_PER_S, clock=clock), lambda _: None)
     assert [line.text for line in summary.lines] == ["student student"]
     assert [fault.exit_code for fault in summary.faults] == [0]
 
@@ -106,7 +106,9 @@ def test_there_is_a_user(clock: str) -> None:
 @pytest.mark.parametrize("clock", ["auto", *more(["wall"])])
 def test_an_executor_that_virtual_time_cannot_hold_runs_on_the_wall_clock(clock: str) -> None:
     """At once, with the line that makes it as the reason."""
-    summary = observe(ObserveRequest((REPORTED / "events_executor.py",), 3 * NS_PER_S, clock=clock), lambda _: None)
+    summary = observe_programs(
+        ObserveRequest((REPORTED / "events_executor.py",), 3 * NS_PER_S, clock=clock), lambda _: None
+    )
     assert summary.clock is ClockKind.WALL
     assert clock == "wall" or "events_executor.py:22 makes an EventsExecutor" in summary.clock_reason
     assert summary.nodes == ("/counter",)

@@ -42,7 +42,7 @@ def test_every_option_that_the_result_depends_on_comes_back() -> None:
         def opened(self, *_: object) -> NoReturn:
             raise AssertionError
 
-        def grade(self, request: GradeRequest, *_: object, **__: object) -> NoReturn:
+        def grade_once(self, request: GradeRequest, *_: object, **__: object) -> NoReturn:
             heard.append(request)
             raise KeyboardInterrupt
 

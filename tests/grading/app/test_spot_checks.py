@@ -14,8 +14,8 @@ from decided import grade_until_decided, say_nothing
 
 from grader.grading.app.grade import Progress
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.spot_checks import SpotChecks, check, is_drawn, shortened
-from grader.grading.app.start import grade
+from grader.grading.app.spot_checks import SpotChecks, check, is_spot_checked, shortened
+from grader.grading.app.start import grade_once
 from grader.grading.judging.beginnings import BeginningJudge
 from grader.grading.judging.checks.fields import FieldEqual
 from grader.grading.judging.checks.rate import TopicRate
@@ -284,12 +284,12 @@ def test_a_slow_start_is_waited_for() -> None:
 def test_the_draw_repeats_and_has_the_share_asked_for() -> None:
     """It follows from the seed, which only the key tells, and the digest."""
     digests = [f"sha256:{n}" for n in range(2000)]
-    drawn = [d for d in digests if is_drawn(0.05, 7, d)]
-    assert drawn == [d for d in digests if is_drawn(0.05, 7, d)]
+    drawn = [d for d in digests if is_spot_checked(0.05, 7, d)]
+    assert drawn == [d for d in digests if is_spot_checked(0.05, 7, d)]
     assert 60 < len(drawn) < 140
-    assert drawn != [d for d in digests if is_drawn(0.05, 8, d)]
-    assert not any(is_drawn(0.0, 7, d) for d in digests)
-    assert all(is_drawn(1.0, 7, d) for d in digests)
+    assert drawn != [d for d in digests if is_spot_checked(0.05, 8, d)]
+    assert not any(is_spot_checked(0.0, 7, d) for d in digests)
+    assert all(is_spot_checked(1.0, 7, d) for d in digests)
 
 
 # --- for real ---
@@ -371,7 +371,7 @@ def told_of(tmp_path: Path, seed: int) -> tuple[int, int, str]:
     shutil.copy(HERE / "tells_the_time.py", folder / "velocity_publisher.py")
     runs: list[Run] = []
     request = GradeRequest(str(folder), exercises=("velocity_publisher",), clock="virtual", seed=seed)
-    grade(request, say_nothing, lambda run, _: runs.append(run), pictures=False)
+    grade_once(request, say_nothing, lambda run, _: runs.append(run), pictures=False)
     (found,) = runs[0].traces.values()
     date, uptime, order = found.records()[0].text.split()
     return int(date), int(uptime), order

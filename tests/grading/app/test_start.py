@@ -12,7 +12,7 @@ from grader.grading.app import start
 from grader.grading.app.bags import read_given, read_recordings
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade, may_run, opened_early
+from grader.grading.app.start import grade_once, may_run, opened_early
 from grader.grading.model.exercise import Location, Outcome
 from grader.grading.rubrics.builtin import builtin_rubrics, exercise_ids
 from grader.runtime.model.errors import RecordingError, RubricError, SubmissionError
@@ -69,16 +69,16 @@ def test_what_holds_no_file_to_run_is_graded_without_a_process(tmp_path: Path, m
     monkeypatch.setattr(os, "posix_spawn", refuse)
     (tmp_path / "velocity_pub.py").write_text("import rclpy")
     for place in (tmp_path, tmp_path / "velocity_pub.py"):
-        report = grade(GradeRequest(str(place), isolation="none"), lambda _: None)
+        report = grade_once(GradeRequest(str(place), isolation="none"), lambda _: None)
         assert {v.outcome for e in report.exercises for v in e.verdicts} == {Outcome.NOT_MET, Outcome.BLOCKED}
     (tmp_path / "velocity_publisher.py").write_text("import rclpy\n\ndef main()\n    rclpy.init()\n")
     monkeypatch.setattr(start, "may_run", lambda *_: False)  # a worker would be started early, and not be used
-    report = grade(GradeRequest(str(tmp_path), isolation="none"), lambda _: None)
+    report = grade_once(GradeRequest(str(tmp_path), isolation="none"), lambda _: None)
     first = report.exercises[0].verdicts[0]
     assert "SyntaxError" in first.reason
     assert first.location == Location("velocity_publisher.py", 3)
     (tmp_path / "velocity_publisher.py").write_text("# still to be written\n")
-    report = grade(GradeRequest(str(tmp_path), isolation="none"), lambda _: None)
+    report = grade_once(GradeRequest(str(tmp_path), isolation="none"), lambda _: None)
     assert report.exercises[0].verdicts[0].reason == "velocity_publisher.py exited after 0.0 s with code 0"
 
 
@@ -114,4 +114,4 @@ def test_a_name_that_no_file_can_have_starts_nothing_and_is_named(name: str) -> 
     with opened_early(name, (), "none", lambda _: None) as session:
         assert session is None
     with pytest.raises(SubmissionError):
-        grade(GradeRequest(name, isolation="none"), lambda _: None)
+        grade_once(GradeRequest(name, isolation="none"), lambda _: None)

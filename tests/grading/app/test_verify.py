@@ -6,29 +6,22 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from places import GRADE
-from sandboxes import USER, unreachable, user_start
 from verifying import differences, program, verified, written
 
 from grader.cli.main import app
-from grader.cli.verify import exit_code
+from grader.cli.verify import verification_exit_code
 from grader.grading.app import verify as verifying
-from grader.grading.app.conditions import LOOPS, VerifyCondition, conditions, surroundings
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.verify import VerifyRequest, verify
-from grader.grading.model.conditions import CONDITIONS, SANDBOXES, USUAL
+from grader.grading.app.verify import LOOPS, VerifyCondition, VerifyRequest, verify, verify_conditions
 from grader.grading.model.verification import ConditionState, Verification
-from grader.runtime.model.errors import EnvironmentFault, HarnessError
-from grader.runtime.ros_installation import RosInstallation
-from grader.runtime.sandbox.tiers import isolation_from_name
+from grader.runtime.model.errors import HarnessError
 
 #: What differs from run to run, and the cause that is found; none where the text tells nothing.
 DIFFERING = {
@@ -138,25 +131,17 @@ RACING = {
 @pytest.mark.nightly
 @pytest.mark.ros
 def test_programs_that_repeat_are_told_from_those_that_do_not(open_folder: Path) -> None:
-    """By recording again, without any other change; those of the wall clock are neither."""
+    """By recording again, also with everything changed and under load; those of the wall clock are neither."""
     texts = {**{name: text for name, (text, _) in DIFFERING.items()}, **REPEATING, **RACING}
-    code, found = verified(written(open_folder, texts), "--condition", "again")
+    code, found = verified(written(open_folder, texts))
     assert code == 1
     assert found["result"] == "different"
     assert {name: one["cause"] for name, one in differences(found).items()} == {
         name: cause for name, (_, cause) in DIFFERING.items()
     }
     assert [Path(one["submission"]).name for one in found["not_comparable"]] == [*RACING]
-    assert [one["compared"] for one in found["conditions"]] == [found["scenarios"] - len(RACING)]
-
-
-@pytest.mark.nightly
-@pytest.mark.ros
-@pytest.mark.parametrize("condition", ["executed", "together"])
-def test_what_repeats_does_so_under_other_conditions(open_folder: Path, condition: str) -> None:
-    """Also what a program draws after it has imported numpy, and how deep it can recurse."""
-    code, found = verified(written(open_folder, REPEATING), "--condition", condition)
-    assert (code, differences(found)) == (0, {})
+    assert [one["name"] for one in found["conditions"]] == ["again", "together", "load"]
+    assert {one["compared"] for one in found["conditions"]} == {found["scenarios"] - len(RACING)}
 
 
 @pytest.mark.nightly
@@ -165,7 +150,7 @@ def test_the_first_difference_says_where_it_is(open_folder: Path) -> None:
     """With both events, and with the line that logged."""
     text = program(imports="import itertools", each="self.get_logger().info(str(id(object())))")
     (path,) = written(open_folder, {"ada": text})
-    done = subprocess.run([GRADE, "verify", path, "--condition", "again"], capture_output=True, text=True, check=False)
+    done = subprocess.run([GRADE, "verify", path], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     line = 1 + text.splitlines().index("        self.get_logger().info(str(id(object())))")
     assert "  DIFFERENT  again, with nothing changed: 1 of 1 scenario\n" in done.stdout
@@ -179,7 +164,7 @@ def test_the_first_difference_says_where_it_is(open_folder: Path) -> None:
 def test_only_the_wall_clock_can_decide(open_folder: Path) -> None:
     """Then nothing is verified, and the reason is said."""
     (path,) = written(open_folder, RACING)
-    done = subprocess.run([GRADE, "verify", path, "--quick"], capture_output=True, text=True, check=False)
+    done = subprocess.run([GRADE, "verify", path], capture_output=True, text=True, check=False)
     assert done.returncode == 3
     assert "Not comparable event by event, because the wall clock decides:" in done.stdout
     assert "there is nothing to compare" in done.stdout
@@ -193,10 +178,10 @@ def test_the_result_in_evidence(open_folder: Path) -> None:
     kept = open_folder / "kept"
     command = [GRADE, path, "--exercise", "velocity_publisher", "-o", f"evidence={kept}"]
     subprocess.run(command, capture_output=True, check=False)
-    code, found = verified([path], "--evidence", str(kept), "--condition", "order")
+    code, found = verified([path], "--evidence", str(kept))
     assert (code, [(one["name"], one["state"]) for one in found["conditions"]]) == (
         0,
-        [("kept", "same"), ("order", "same")],
+        [("kept", "same"), ("again", "same"), ("together", "same"), ("load", "same")],
     )
     assert json.loads((kept / "verification.json").read_text(encoding="utf-8")) == found
     before = json.loads((kept / "report.json").read_text(encoding="utf-8"))
@@ -227,25 +212,6 @@ def test_changed_evidence_differs(open_folder: Path) -> None:
     assert "one that shows something else" in done.stderr
 
 
-@pytest.mark.nightly
-@pytest.mark.ros
-def test_an_ordinary_user(open_folder: Path, ros: RosInstallation) -> None:
-    """Who cannot become another one, and has another sandbox than root."""
-    if os.geteuid() != 0:
-        pytest.skip("only root can become an ordinary user")
-    before = user_start(ros)
-    if why := unreachable(before, ros):
-        pytest.skip(why)
-    paths = written(open_folder, {"ada": REPEATING["plain"]})
-    home = open_folder / "home"
-    home.mkdir()
-    os.chown(home, USER, USER)
-    own = {"HOME": str(home), "XDG_CACHE_HOME": str(home), "TMPDIR": str(home)}
-    options = ("--condition", "order", "--condition", "user", "--condition", "bubblewrap-root")
-    code, found = verified(paths, *options, before=before, **own)
-    assert (code, [one["state"] for one in found["conditions"]]) == (0, ["same", "not_tried", "not_tried"])
-
-
 # --- the conditions ---------------------------------------------------------------------------------------------------
 
 #: Stands in for the program that records, and says what it was started with.
@@ -262,8 +228,7 @@ for name in names:
     except OSError:
         pass
 said = {name: os.environ.get(name) for name in ("TZ", "LANG", "PYTHONHASHSEED", "TMPDIR", "HOME", "GRADER_SEED_KEY")}
-said |= {"user": os.getuid(), "loops": loops, "cwd": os.getcwd(), "folder": os.path.isdir(said["TMPDIR"] or "/")}
-said |= {name: told[name] for name in ("isolation", "processors", "reverses", "executes")}
+said |= {"loops": loops, "cwd": os.getcwd(), "folder": os.path.isdir(said["TMPDIR"] or "/"), "changed": told["changed"]}
 print(json.dumps({"isolation": "x", "said": said}))
 """
 
@@ -282,97 +247,34 @@ def started(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[Verify
     return start
 
 
-def made(name: str, isolation: str = "landlock", **changes: Any) -> VerifyCondition:
-    """Return a condition, in surroundings that differ from those here in some ways."""
-    (condition,) = conditions([name], isolation, replace(surroundings(), **changes))
-    return condition
+MADE = {one.name: one for one in verify_conditions()}
 
 
 def test_each_condition_is_made(started: Callable[[VerifyCondition], dict[str, Any]]) -> None:
     """And nothing else is changed by it."""
-    usual = started(made("again"))
+    usual = started(MADE["again"])
     assert (usual["cwd"], usual["PYTHONHASHSEED"], usual["GRADER_SEED_KEY"], usual["loops"]) == ("/", "1", None, 0)
-    expected: dict[str, dict[str, Any]] = {
-        "order": {"reverses": True},
-        "processors": {"processors": [min(os.sched_getaffinity(0))]},
-        "load": {"loops": LOOPS * len(os.sched_getaffinity(0))},
-        "executed": {"executes": True},
-        "zone": {"TZ": "Asia/Kathmandu", "LANG": "de_DE.ISO-8859-1"},
-        "hashes": {"PYTHONHASHSEED": "2"},
+    assert not usual["changed"]
+    assert started(MADE["load"]) == {**usual, "loops": LOOPS * len(os.sched_getaffinity(0))}
+    together = started(MADE["together"])
+    assert together.pop("TMPDIR").endswith("/another temporary folder")
+    changes = {
+        "changed": True,
+        "TZ": "Asia/Kathmandu",
+        "LANG": "de_DE.ISO-8859-1",
+        "PYTHONHASHSEED": "2",
+        "folder": True,
     }
-    for name, changes in expected.items():
-        assert started(made(name)) == {**usual, **changes}, name
-    said = started(made("folder"))
-    assert (said["folder"], Path(said["TMPDIR"]).name) == (True, "another temporary folder")
-    both = started(made("together"))
-    assert (both["reverses"], both["executes"], both["TZ"], both["PYTHONHASHSEED"]) == (
-        True,
-        True,
-        "Asia/Kathmandu",
-        "2",
-    )
+    assert together == {name: value for name, value in {**usual, **changes}.items() if name != "TMPDIR"}
 
 
 def test_no_loop_is_left(started: Callable[[VerifyCondition], dict[str, Any]]) -> None:
     """Neither after a recording, nor if the one who started them is killed."""
-    started(made("load"))
-    assert started(made("again"))["loops"] == 0
+    started(MADE["load"])
+    assert started(MADE["again"])["loops"] == 0
     # It holds the output of the one who started it, and ends at once, because that is another process than it is told.
     loop = f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {verifying.LOOP!r}, str(2**22)])"
     subprocess.run([sys.executable, "-c", loop], capture_output=True, check=True, timeout=300)
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-def test_another_user(tmp_path: Path) -> None:
-    """With a home of its own; a program that this user cannot start is named."""
-    tmp_path.chmod(0o755)
-    says = 'cat > /dev/null; echo "{\\"said\\": \\"$(id -u) $(stat -c %u "$HOME")\\", \\"isolation\\": \\"x\\"}"'
-    with tempfile.TemporaryDirectory() as name:  # every user can enter what is above it
-        Path(name).chmod(0o755)
-        condition = made("user", python="/bin/true")
-        (line,) = verifying._recorded(Path(name), [], condition, "none", ("/bin/sh", "-c", says))
-    assert condition.not_tried == ""
-    assert line["said"] == f"{condition.user} {condition.user}"
-    assert condition.user != 0
-    lacking = made("user", python="/nowhere/python")
-    assert lacking.not_tried == f"user {lacking.user} cannot execute /nowhere/python"
-    assert made("user", python="/bin/false").not_tried.endswith(" cannot read what /bin/false needs")
-
-
-def test_what_this_machine_cannot_make_is_named() -> None:
-    """With the reason."""
-    assert made("processors", processors=(3,)).not_tried == "there is one processor only"
-    assert made("user", is_root=False).not_tried == "only root can become another user"
-
-    def cannot(name: str) -> Any:
-        raise EnvironmentFault(f"isolation {name}: expected bubblewrap, found none")
-
-    for name in SANDBOXES:
-        assert made(name, "none", can_fork=cannot).not_tried == "expected bubblewrap, found none"
-    assert made("executed", can_fork=lambda _: False).not_tried == "in the sandbox landlock, each is executed anyway"
-    assert not made("together", can_fork=lambda _: False).executes
-
-
-def test_no_sandbox_is_tried_that_holds_less_unless_it_is_named() -> None:
-    """A stranger's program must not reach a network because somebody verifies it; and never without a sandbox."""
-    assert "none" not in CONDITIONS
-    assert set(USUAL) == set(CONDITIONS) - {"together"}
-    for name in SANDBOXES:
-        try:
-            isolation_from_name(name)
-        except EnvironmentFault:
-            continue
-        found = next(one for one in conditions([], "none", surroundings()) if one.name == name)
-        asked = made(name, "none")
-        if found.not_tried:
-            assert "does not contain" in found.not_tried or asked.not_tried
-        else:
-            assert not asked.not_tried
-
-
-def test_the_sandbox_of_the_first_recording_is_no_other_condition() -> None:
-    """It would only be recorded again."""
-    assert [one.name for one in conditions(["again", "landlock"], "landlock", surroundings())] == ["again"]
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------
@@ -387,8 +289,6 @@ def run(*words: str) -> tuple[int, str]:
     ("words", "message"),
     [
         (("nothing-here",), "expected a folder, a .py file or an archive, found nothing there"),
-        (("a", "--condition", "luck"), "'luck' is not one of 'again', 'order'"),
-        (("a", "--quick", "--condition", "order"), "--quick and --condition exclude each other"),
         (("a", "b", "--evidence", "e"), "expected one SUBMISSION, found several"),
         (("a", "--evidence", "e", "--seed", "7"), "leave out the other options"),
         (("a", "--evidence", "e"), "e/evidence.json"),
@@ -409,7 +309,7 @@ def test_what_cannot_be_used(
 def recorded_by(code: str, path: str) -> Verification:
     """Verify a submission of which other code makes the recordings."""
     program = (sys.executable, "-c", f"import json, sys\ntold = json.load(sys.stdin)\n{code}")
-    request = VerifyRequest((path,), GradeRequest("", seed=1), ("again",), program=program)
+    request = VerifyRequest((path,), GradeRequest("", seed=1), program=program)
     return verify(request, lambda text: None)
 
 
@@ -434,7 +334,7 @@ import os, pathlib
 mark = pathlib.Path({mark!r})
 times = len(mark.read_text()) if mark.exists() else 0
 mark.write_text("x" * (times + 1))
-print(json.dumps({{"isolation": "none", "can_fork": True}}))
+print(json.dumps({{"isolation": "none"}}))
 trace = {{"format": "grader/trace/v1", "scenario": "alone", "clock": "virtual", "clock_reason": "", "stop_ns": 5}}
 trace |= {{"notes": [], "harness_problem": "", "observations": []}}
 line = {{"number": 0, "exercise": "velocity_publisher", "scenario": "alone", "trace": trace}}
@@ -463,5 +363,5 @@ def test_exit_codes(then: str, code: int, state: ConditionState, tmp_path: Path)
     """A recording that is missing or failed is no difference, and does not count as the same either."""
     (path,) = written(tmp_path, {"ada": REPEATING["plain"]})
     found = recorded_by(ANSWERS.format(mark=str(tmp_path / "mark"), then=then), path)
-    assert exit_code(found) == code, found
-    assert [condition.state for condition in found.tried] == [state]
+    assert verification_exit_code(found) == code, found
+    assert {condition.state for condition in found.tried} == {state}

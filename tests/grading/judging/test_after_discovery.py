@@ -7,7 +7,7 @@ import pytest
 from grader.grading.judging.checks.fields import FieldEqual, FieldInRange, FieldMonotone, RandomInRange
 from grader.grading.judging.checks.rate import TopicRate
 from grader.grading.judging.checks.topics import FieldValues, Publishes, Transform
-from grader.grading.judging.judge_run import unheard
+from grader.grading.judging.judge_run import notes_on_unheard
 from grader.grading.judging.summary import summarise
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.reporting.observed import render_summary
@@ -95,7 +95,7 @@ def test_a_silent_publisher_is_not_early() -> None:
 def test_a_note_says_which_messages_nobody_would_have_heard(early: tuple[int, int], which: str) -> None:
     """In reports and in what `observe` shows; nothing is said of a topic whose messages were all heard."""
     trace = sent("/news", FLOAT, {"data": 1.0}, *(n / 2 for n in range(early[1])), early=early[0])
-    (note,) = unheard(trace)
+    (note,) = notes_on_unheard(trace)
     assert note.startswith(f"/news: {which}")
     assert note in render_summary(summarise(trace, ["a.py"], "none"))
-    assert unheard(sent("/news", FLOAT, {"data": 1.0}, 0.0, early=0)) == ()
+    assert notes_on_unheard(sent("/news", FLOAT, {"data": 1.0}, 0.0, early=0)) == ()

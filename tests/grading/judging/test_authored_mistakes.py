@@ -16,7 +16,7 @@ from places import GRADE
 from grader.course.classroom.gradebook import Gradebook, Row, Status
 from grader.grading.judging.judge_run import judge_run
 from grader.grading.model.exercise import Finding, Location, Outcome
-from grader.grading.model.report import Environment, ExerciseReport, Report, exit_code
+from grader.grading.model.report import Environment, ExerciseReport, Report, report_exit_code
 from grader.grading.model.run import Run
 from grader.grading.reporting import wording
 from grader.grading.reporting.formats import FORMATS, PageLayout
@@ -145,7 +145,7 @@ def test_a_mistake_in_a_check_is_the_authors_and_costs_no_report(tmp_path: Path,
     assert (early.outcome, early.score, runs.outcome) == (Outcome.UNDECIDED, 0, Outcome.MET)
     assert early.reason.startswith(f"the rubric has a mistake: {told}")
     assert (later.outcome, later.blocked_by) == (Outcome.UNDECIDED, "early")
-    assert exit_code(found, None) == exit_code(found, Fraction(10)) == UNUSABLE
+    assert report_exit_code(found, None) == report_exit_code(found, Fraction(10)) == UNUSABLE
     (warning,) = wording.warnings(found)
     assert told in warning
     assert "2 criteria are undecided and 13 points are still open" in warning
@@ -159,7 +159,7 @@ def test_a_simulation_that_fails_is_the_authors_mistake_too(tmp_path: Path) -> N
     assert trace_from_json(json.loads(json.dumps(trace_to_json(trace)))) == trace
     found = report(tmp_path, CHECKS_FILE, trace)
     assert {v.reason for v in found.exercises[0].verdicts[:2]} == {f"the rubric has a mistake: {mistake}"}
-    assert exit_code(found, None) == UNUSABLE
+    assert report_exit_code(found, None) == UNUSABLE
     assert len(wording.warnings(found)) == 1
 
 
@@ -273,4 +273,4 @@ def test_a_mistake_of_the_grader_in_its_own_check_is_not_the_authors(tmp_path: P
     exercise = found.exercises[0]
     assert isinstance(exercise, ExerciseReport)
     undecided = replace(exercise.verdicts[1], outcome=Outcome.UNDECIDED, evidence={"error": "KeyError: x"})
-    assert exit_code(replace(found, exercises=(replace(exercise, verdicts=(undecided,)),)), None) == 3
+    assert report_exit_code(replace(found, exercises=(replace(exercise, verdicts=(undecided,)),)), None) == 3

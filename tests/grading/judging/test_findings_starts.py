@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from grader.grading.judging.findings import fault_sentence
-from grader.grading.judging.judge_run import started
+from grader.grading.judging.judge_run import unusual_starts
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
 
 
@@ -21,7 +21,7 @@ from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Start, Start
 def test_only_what_is_not_ordinary_is_noted(way: StartWay, target: str, notes: tuple[str, ...]) -> None:
     """A script that was run as a script needs no line."""
     trace = Trace("alone", ClockKind.VIRTUAL, 0, (), starts=(Start("a.py", "p/a.py", way, target),))
-    assert started(trace) == notes
+    assert unusual_starts(trace) == notes
 
 
 @pytest.mark.parametrize(

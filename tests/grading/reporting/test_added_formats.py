@@ -19,7 +19,7 @@ from grader.cli.main import app
 from grader.grading.app.doctor import _added
 from grader.grading.model.entry_points import FORMATS as GROUP
 from grader.grading.reporting.audience import ANYBODY
-from grader.grading.reporting.delivery import Output, deliver, early_delivery, prepared
+from grader.grading.reporting.delivery import Output, deliver, early_delivery, prepared_outputs
 from grader.grading.reporting.formats import FORMATS, PageLayout, added_formats, format_of, rendered
 from grader.runtime.model.errors import EnvironmentFault
 
@@ -87,7 +87,7 @@ def test_it_is_found_rendered_and_delivered_like_any_other(package: Path, tmp_pa
     """To a file or standard output, by its name."""
     register(package, GROUP, {"mine": "mine_module:ROW"}, GOOD)
     assert added_formats() == ["mine"]
-    outputs = prepared([Output("mine", tmp_path / "report.mine")])
+    outputs = prepared_outputs([Output("mine", tmp_path / "report.mine")])
     deliver(middling(), outputs[:1])
     text = (tmp_path / "report.mine").read_text(encoding="utf-8")
     assert text == f"{middling().name} {float(middling().score):g}" == rendered("mine", middling(), LAYOUT, ANYBODY)
@@ -131,7 +131,7 @@ def test_one_that_fails_costs_no_other_report(package: Path, tmp_path: Path, mis
     """All others are delivered, then the message names the package."""
     body, said = WRONG[mistake]
     register(package, GROUP, {"mine": "mine_module:ROW"}, FAILS.format(body=body, options=""))
-    outputs = prepared([Output("mine", tmp_path / "x"), Output("json", tmp_path / "report.json")])
+    outputs = prepared_outputs([Output("mine", tmp_path / "x"), Output("json", tmp_path / "report.json")])
     with pytest.raises(EnvironmentFault, match=r"the format 'mine' of mine 1\.0") as error:
         deliver(middling(), outputs)
     assert said in error.value.message
@@ -146,7 +146,7 @@ def test_one_that_fails_on_standard_output_leaves_the_text_on_standard_error(
     """The mark was earned; what reads standard output finds nothing there that it does not understand."""
     register(package, GROUP, {"mine": "mine_module:ROW"}, FAILS.format(body="raise KeyError('x')", options=""))
     with pytest.raises(EnvironmentFault, match="failed: KeyError"):
-        deliver(middling(), prepared([Output("mine")]))
+        deliver(middling(), prepared_outputs([Output("mine")]))
     printed = capfd.readouterr()
     assert printed.out == ""
     assert rendered("text", middling(), PageLayout(80, colour=False), ANYBODY).splitlines()[0] in printed.err
@@ -164,7 +164,7 @@ def test_a_partial_report_that_cannot_be_written_ends_no_run(package: Path, tmp_
 def test_a_text_that_nobody_can_encode_is_written_all_the_same(package: Path, tmp_path: Path) -> None:
     """A lone surrogate of a student's becomes U+FFFD."""
     register(package, GROUP, {"mine": "mine_module:ROW"}, FAILS.format(body=r"return 'a\ud800'", options=""))
-    deliver(hostile(), prepared([Output("mine", tmp_path / "x")])[:1])
+    deliver(hostile(), prepared_outputs([Output("mine", tmp_path / "x")])[:1])
     assert (tmp_path / "x").read_text(encoding="utf-8") == "a\ufffd"
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from report_samples import hostile, middling, partial
 
-from grader.grading.reporting.delivery import Output, deliver, early_delivery, prepared
+from grader.grading.reporting.delivery import Output, deliver, early_delivery, prepared_outputs
 from grader.grading.reporting.formats import FORMATS
 from grader.grading.reporting.platforms.classroom50 import VARIABLES
 from grader.runtime.model.errors import GraderError
@@ -34,7 +34,7 @@ def test_every_format_is_written_to_its_file(in_a_classroom: None, tmp_path: Pat
     """Whole, in UTF-8, and for a hostile submission too."""
     path = tmp_path / "report"
     sample = replace(hostile(), path=str(tmp_path))
-    deliver(sample, prepared([Output(name, path)])[:1])
+    deliver(sample, prepared_outputs([Output(name, path)])[:1])
     assert path.read_text(encoding="utf-8").strip()
     assert [p.name for p in tmp_path.iterdir()] == ["report"]
 
@@ -44,7 +44,7 @@ def test_every_format_can_be_printed(
     in_a_classroom: None, capfdbinary: pytest.CaptureFixture[bytes], name: str
 ) -> None:
     """`-o FORMAT=-` prints that one and nothing else; what programs read is in UTF-8 whatever the terminal speaks."""
-    outputs = prepared([Output(name)])
+    outputs = prepared_outputs([Output(name)])
     assert outputs == (Output(name),)
     deliver(replace(middling(), path="/nowhere/at/all.zip"), outputs)
     printed = capfdbinary.readouterr().out
@@ -58,7 +58,7 @@ def test_a_format_that_lacks_its_surroundings_is_refused_before_grading(
     for name in HANDED_IN:
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(GraderError, match="classroom50: expected CLASSROOM, ASSIGNMENT"):
-        prepared([Output("classroom50", tmp_path / "result.json")])
+        prepared_outputs([Output("classroom50", tmp_path / "result.json")])
 
 
 def test_only_platforms_that_end_runs_get_partial_reports(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from grader.grading.model.verification import (
     Tried,
     Verification,
 )
-from grader.grading.reporting.verified import advice, described, render_verification, verification_to_json
+from grader.grading.reporting.verified import advice_on, both_sides, render_verification, verification_to_json
 from grader.runtime.model.trace import Endpoint, GraphSnapshot, LogRecord, Message
 
 PLACE = Place("ada", "velocity_publisher", "alone")
@@ -99,20 +99,20 @@ def test_long_lists_are_cut() -> None:
 )
 def test_one_thing_to_do(difference: Difference, beginning: str) -> None:
     """By the kind of the difference, and by what the text of the program suggests."""
-    assert advice(DIFFERENT, difference).startswith(beginning)
+    assert advice_on(DIFFERENT, difference).startswith(beginning)
 
 
 def test_a_program_that_differs_by_itself_is_not_reported() -> None:
     """Where nothing was changed, or that was not tried, it may be the program."""
     for again in ((replace(AGAIN, state=ConditionState.DIFFERENT),), ()):
         verification = replace(DIFFERENT, tried=(*again, LOAD))
-        assert advice(verification, TIMED).startswith("find out where what a.py:16 shows comes from")
+        assert advice_on(verification, TIMED).startswith("find out where what a.py:16 shows comes from")
 
 
 def test_of_long_events_what_surrounds_the_difference_is_shown() -> None:
     """A long text that differs at its end alone."""
     texts = [f"{'x' * 500}{end}{'y' * 500}" for end in "ab"]
-    one, two = described(replace(TIMED, first=replace(FIRST, text=texts[0]), other=replace(FIRST, text=texts[1])))
+    one, two = both_sides(replace(TIMED, first=replace(FIRST, text=texts[0]), other=replace(FIRST, text=texts[1])))
     assert one.startswith("...")
     assert len(one) < 200
     assert (one.index("a"), two.index("b")) == (43, 43)

@@ -22,9 +22,9 @@ from grader.grading.reporting.json_report import dumps
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.exercise_checks import hints_of, known_checks
 from grader.grading.rubrics.loader import read_rubric, side_files
-from grader.grading.rubrics.own_checks import digest_of
+from grader.grading.rubrics.own_checks import rubric_digest
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.recording.packed import unpack
+from grader.runtime.recording.packed import unpack_trace
 from grader.runtime.shipped import shipped
 
 SHARED = {name: kind for name, kind in known_checks().items() if name not in CHECKS}
@@ -59,7 +59,9 @@ def elsewhere(tmp_path: Path) -> Path:
 
 def verdict(exercise: Exercise, sample: str = "wrong/fan_on_at_25") -> tuple[str, str, int | None]:
     """Judge a recording of exercise 3; return hint, cause and line of the first lost criterion."""
-    trace = unpack(recorded_of(EXERCISES / "exercise_3")[sample].traces["two_node_communication.controller_alone"])
+    trace = unpack_trace(
+        recorded_of(EXERCISES / "exercise_3")[sample].traces["two_node_communication.controller_alone"]
+    )
     file = "fan_controller.py"
     submission = Submission("s", "s", Path("s"), "sha256:1", {file: StudentFile(file, file)})
     text = (EXERCISES / "exercise_3" / sample / file).read_text(encoding="utf-8")
@@ -130,7 +132,7 @@ def test_the_exercise_itself_brings_its_files() -> None:
     """They are part of its digest: another check is another rubric."""
     files = side_files(FAN)
     assert [file.name for file in files][:2] == ["checks.py", "hints.py"]
-    assert read_rubric(FAN).digest == digest_of(FAN.read_bytes(), files)
+    assert read_rubric(FAN).digest == rubric_digest(FAN.read_bytes(), files)
 
 
 def test_a_rubric_without_such_a_check_has_no_such_rules() -> None:

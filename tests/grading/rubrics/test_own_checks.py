@@ -31,7 +31,7 @@ from grader.grading.model.exercise import Location, Outcome
 from grader.grading.model.grading_options import GradingOptions
 from grader.grading.model.report import Verdict
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric, side_files
-from grader.runtime.model.author_files import run
+from grader.runtime.model.author_files import run_author_file
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import StudentFile, Submission
 from grader.runtime.model.trace import Trace
@@ -257,7 +257,7 @@ def test_the_examples_on_the_page_about_own_checks_work() -> None:
     (sources,) = (block for block in blocks if block.startswith("    def judge_sources"))
     names = "from collections.abc import Mapping\nfrom dataclasses import replace\n"
     names += "from grader.api import Location, partly\n"
-    own = run("_example", "own-check.md", f"{blocks[0]}\n{names}\n\n{proportional}\n{sources}".encode())
+    own = run_author_file("_example", "own-check.md", f"{blocks[0]}\n{names}\n\n{proportional}\n{sources}".encode())
     check = vars(own)["MeanError"]("/goal", full=1.0, none=3.0)
 
     def at(*distances: float) -> Trace:

@@ -28,7 +28,8 @@ WITH_HINTS = RUBRIC.replace("checks: [pump_checks.py]", "checks: [pump_checks.py
 HINTS = '''\
 """Mistakes with pumps."""
 
-from grader.api import Case, Clue, hint_rule, made, number_in_code
+from grader.api import Case, Clue, hint_rule
+from grader.api.unstable import made, number_in_code
 
 
 @hint_rule("starts_early")
@@ -118,27 +119,27 @@ def test_one_file_may_hold_checks_and_rules(tmp_path: Path) -> None:
         (
             '"starts_early"',
             '"starts_erly"',
-            "6: `slow_pump`: expected the name of a check, found `starts_erly`; did you",
+            "7: `slow_pump`: expected the name of a check, found `starts_erly`; did you",
         ),
         ('@hint_rule("starts_early")\n', "", "1: expected hint rules, which are functions with @hint_rule(...)"),
         (
             '@hint_rule("starts_early")',
             "@hint_rule",
-            "6: expected a file that can be imported, found TypeError: expected",
+            "7: expected a file that can be imported, found TypeError: expected",
         ),
-        ('"starts_early"', "priority='x'", "6: `slow_pump`: expected a whole number as priority, found 'x'"),
-        ('"starts_early"', "problem='silent'", "6: `slow_pump`: expected a ProblemKind as problem, found 'silent'"),
-        ('"starts_early"', "outcome=1", "6: `slow_pump`: expected an Outcome as outcome, found 1"),
-        ('"starts_early"', "fault='no'", "6: `slow_pump`: expected True, False or None as fault, found 'no'"),
-        ("(case: Case)", "()", "6: `slow_pump`: expected a function of one argument, the case, found another one"),
-        ("def slow_pump", "def never_called", "6: `never_called`: expected a new name, found one that is taken"),
+        ('"starts_early"', "priority='x'", "7: `slow_pump`: expected a whole number as priority, found 'x'"),
+        ('"starts_early"', "problem='silent'", "7: `slow_pump`: expected a ProblemKind as problem, found 'silent'"),
+        ('"starts_early"', "outcome=1", "7: `slow_pump`: expected an Outcome as outcome, found 1"),
+        ('"starts_early"', "fault='no'", "7: `slow_pump`: expected True, False or None as fault, found 'no'"),
+        ("(case: Case)", "()", "7: `slow_pump`: expected a function of one argument, the case, found another one"),
+        ("def slow_pump", "def never_called", "7: `never_called`: expected a new name, found one that is taken"),
         (
             "from grader.api",
             "from grader.nothing",
             "3: expected a file that can be imported, found ModuleNotFoundError",
         ),
-        ("made, number_in_code", "made, nothing_such", "3: expected a file that can be imported, found ImportError"),
-        ("    for timer", "    for timer for", "9: expected a file that can be imported, found SyntaxError"),
+        ("made, number_in_code", "made, nothing_such", "4: expected a file that can be imported, found ImportError"),
+        ("    for timer", "    for timer for", "10: expected a file that can be imported, found SyntaxError"),
     ],
 )
 def test_a_mistake_in_a_file_of_rules_is_told_with_its_place(tmp_path: Path, old: str, new: str, told: str) -> None:
@@ -172,7 +173,7 @@ def test_rules_are_never_taken_from_students(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("body", "told"),
     [
-        ("return 1 / 0", "pump_hints.py:9: the rule slow_pump: ZeroDivisionError: division by zero"),
+        ("return 1 / 0", "pump_hints.py:10: the rule slow_pump: ZeroDivisionError: division by zero"),
         ("return 'x'", "pump_hints.py: the rule slow_pump: TypeError: expected a Clue or None, found a str"),
         ("return Clue(1)", "pump_hints.py: the rule slow_pump: TypeError: expected a clue with a string as hint"),
         ("return Clue('x', 3)", "pump_hints.py: the rule slow_pump: TypeError: expected a clue with a Location"),

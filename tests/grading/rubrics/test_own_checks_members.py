@@ -12,7 +12,7 @@ from grader.api import NODE_GRAPH, Check, Drawing, Finding, Plot, Roles, Trace, 
 from grader.course.authoring.checking import check_rubric
 from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.judging.plots import chart_of, shows_graph
-from grader.grading.model.exercise import has, named, of_beginning, reads_sources, roles_of
+from grader.grading.model.exercise import has_member, of_beginning, reads_sources, roles_of, texts_under
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.submission import StudentFile, Submission
@@ -61,10 +61,10 @@ def test_without_a_member_the_documented_value_applies() -> None:
     for check in (Plain(), Derived()):
         assert not reads_sources(check)
         assert of_beginning(check) is check
-        assert not has(check, "drawing")
+        assert not has_member(check, "drawing")
         assert roles_of(type(check)) == Roles()
-    assert has(Derived(), "expected")
-    assert not has(Plain(), "expected")
+    assert has_member(Derived(), "expected")
+    assert not has_member(Plain(), "expected")
 
 
 def test_a_drawing_is_used_in_place_of_the_general_chart() -> None:
@@ -223,5 +223,5 @@ def test_every_role_names_a_parameter() -> None:
             asked = {*ends, *declared.logs, *declared.given}
             assert asked
             assert asked <= held
-    assert named(Plain(), "topic", "nothing") == ("/flow",)
+    assert texts_under(Plain(), "topic", "nothing") == ("/flow",)
     assert not_met("no").facts is None

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from grader.cli.main import app
-from grader.grading.app.seeds import ByKey, by_key, checked, read_key
+from grader.grading.app.seeds import ByKey, by_key, checked_student, read_key
 from grader.grading.rubrics.variants import VariantOptions
 from grader.runtime.model.errors import KeyFileError, VariantError
 
@@ -59,7 +59,7 @@ def test_values_differ_by_student_exercise_and_key() -> None:
 def test_an_id_that_is_none_is_refused(student: str) -> None:
     """It could not be typed again, or would forge a line."""
     with pytest.raises(VariantError, match="expected the id of a student"):
-        checked(student)
+        checked_student(student)
 
 
 def test_a_key_is_read_without_the_line_break_behind_it(tmp_path: Path) -> None:

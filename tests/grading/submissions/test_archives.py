@@ -30,7 +30,7 @@ from hypothesis.strategies._internal.core import DataObject
 
 from grader.grading.submissions.archives import collect_archive
 from grader.grading.submissions.collected import SubmissionLimits
-from grader.grading.submissions.foreign_archives import UnpackerLimits, foreign_members, is_installed
+from grader.grading.submissions.foreign_archives import UnpackerLimits, foreign_members, has_libarchive
 from grader.grading.submissions.members import UnusableArchiveError
 from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.errors import SubmissionError
@@ -63,7 +63,7 @@ FOREIGN: dict[str, Packer] = {
     "rar": rarred,
     "old rar": old_rarred,
 }
-needs_libarchive = pytest.mark.skipif(not is_installed(), reason="pip install -e '.[archives]', and libarchive13")
+needs_libarchive = pytest.mark.skipif(not has_libarchive(), reason="pip install -e '.[archives]', and libarchive13")
 EVERY = [*PACKERS, *(pytest.param(kind, marks=needs_libarchive) for kind in FOREIGN)]
 
 
@@ -324,7 +324,7 @@ def test_a_limit_exceeded_is_refused(
 
 def test_a_file_that_is_too_large_is_left_out_with_a_note(tmp_path: Path) -> None:
     """As of a folder: a recording beside the work costs nothing."""
-    for number, packed in enumerate([*HONEST, *([rarred] if is_installed() else [])]):
+    for number, packed in enumerate([*HONEST, *([rarred] if has_libarchive() else [])]):
         submission = hand_in(tmp_path / str(number), packed({**FILES, "bag.mcap": os.urandom((8 << 20) + 1)}))
         assert staged(submission.root) == FILES
         assert submission.notes == ("not copied: bag.mcap (larger than 8 MiB)",)

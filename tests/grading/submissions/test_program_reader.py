@@ -15,13 +15,13 @@ from program_shapes import DEPTHS, ENCODINGS, SHAPES
 from tiers import each
 
 from grader.grading.judging.diagnosis import hint_for, placed_in
-from grader.grading.judging.source import Source, parsed, read
+from grader.grading.judging.source import Source, parsed_source, read_source
 from grader.grading.judging.syntax import MOST_DEPTH, MOST_NODES, UnfitTree, json_of, measured, tree_of
 from grader.grading.submissions import submission_reader
 from grader.grading.submissions.answers import LONG_FILE, UNREADABLE
 from grader.grading.submissions.contained_reader import Asked, ReaderAnswer
 from grader.grading.submissions.contents import read_contents
-from grader.grading.submissions.program_reader import Described, described, prepare
+from grader.grading.submissions.program_reader import Described, load_encodings, program_description
 from grader.grading.submissions.sources import Programs, read_programs, read_texts
 from grader.runtime.model.limits import MAX_PROGRAM_BYTES
 from grader.runtime.model.submission import Beginning, ReadProgram, SourceText
@@ -43,7 +43,7 @@ def counted(made: Callable[[], Value]) -> tuple[Value, int]:
 
 def read_here(content: bytes) -> Described:
     """Read a file as the contained process does, in the test's own."""
-    return described(content, prepare([content]))
+    return program_description(content, load_encodings([content]))
 
 
 def dump(tree: ast.AST) -> str:
@@ -153,7 +153,7 @@ def test_trees_beyond_the_limits_are_not_told() -> None:
         assert measured(tree)[0] > MOST_NODES or measured(tree)[1] > MOST_DEPTH
         with pytest.raises(UnfitTree):
             json_of(tree)
-        assert parsed(ast.unparse(tree)) is None
+        assert parsed_source(ast.unparse(tree)) is None
 
 
 def test_a_file_that_is_too_deep_is_a_note_and_nothing_else(tmp_path: Path) -> None:
@@ -186,7 +186,7 @@ def test_all_programs_of_a_submission_are_counted_together(tmp_path: Path, monke
             asked.programs,
             [memoryview(c) for c in asked._contents],
             set(asked.likely),
-            prepare(()),
+            load_encodings(()),
             decoded=False,
         )
     )
@@ -286,9 +286,9 @@ def test_texts_that_are_kept_get_trees_only_if_they_are_looked_at() -> None:
     found = read_texts(texts, tell)
     assert found == texts
     assert asked == []
-    source = read("a.py", found["a.py"])
+    source = read_source("a.py", found["a.py"])
     assert [node.value for node in source.all(ast.Constant)] == ["ü"]
-    read("a.py", found["a.py"])
+    read_source("a.py", found["a.py"])
     assert len(asked) == 1
 
 
@@ -299,4 +299,4 @@ def test_a_tree_that_was_made_elsewhere_is_never_parsed_again(monkeypatch: pytes
         pytest.fail("a text was parsed")
 
     monkeypatch.setattr(ast, "parse", refuse)
-    assert read("a.py", SourceText("x = 1\n")) == Source("a.py", ("x = 1", ""))
+    assert read_source("a.py", SourceText("x = 1\n")) == Source("a.py", ("x = 1", ""))

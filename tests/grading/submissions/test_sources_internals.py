@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from sample_folders import folders_in
 
-from grader.grading.submissions.program_reader import described, prepare
+from grader.grading.submissions.program_reader import load_encodings, program_description
 from grader.grading.submissions.sources import LONG_FILE, UNREADABLE, read_reaches
 
 SUSPICIOUS = {
@@ -161,7 +161,7 @@ ORDINARY = {
 def reaching(text: str | bytes) -> list[str]:
     """Return what the contained process tells of a program, here in the test's own."""
     content = text.encode() if isinstance(text, str) else text
-    names: list[str] = described(content, prepare([content])).row["reaches"]
+    names: list[str] = program_description(content, load_encodings([content])).row["reaches"]
     return names
 
 

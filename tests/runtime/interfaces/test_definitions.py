@@ -14,8 +14,8 @@ from grader.runtime.interfaces.definitions import (
     digest,
     files_in,
     find_packages,
-    read,
     read_definition,
+    read_definitions,
 )
 
 INSTALLED = {"std_msgs/msg/Header", "geometry_msgs/msg/Point"}
@@ -27,7 +27,7 @@ def of(text: str, kind: str = "msg", name: str = "Foo") -> InterfacePackage:
 
 def refusal(*packages: InterfacePackage) -> DefinitionError:
     with pytest.raises(DefinitionError) as caught:
-        read(packages, INSTALLED)
+        read_definitions(packages, INSTALLED)
     return caught.value
 
 
@@ -110,7 +110,7 @@ def test_reads_types_values_and_comments() -> None:
         string GREETING="it's"
         uint8 HEX=0x1F
     """
-    interface, _ = read([of(text), of("", name="Bar")], INSTALLED)
+    interface, _ = read_definitions([of(text), of("", name="Bar")], INSTALLED)
     (section,) = interface.sections
     assert [(each.type, each.name, each.value) for each in section.fields] == [
         (FieldType("std_msgs/msg/Header"), "header", None),
@@ -220,7 +220,7 @@ def digested_and_read(folder: Path) -> None:
     """Do what is done with the packages of a submission before they are built."""
     found = find_packages(folder)
     digest(found)
-    read(found, INSTALLED)
+    read_definitions(found, INSTALLED)
 
 
 @pytest.mark.parametrize(("manifest", "file", "text"), ODD.values(), ids=ODD)

@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from grader.runtime.model.author_files import run
+from grader.runtime.model.author_files import run_author_file
 
 #: Long enough for a thread to return that does not wait; one that waits makes the test this much longer.
 ENOUGH_S = 0.2
@@ -28,7 +28,7 @@ def test_no_thread_sees_half_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[list[str]] = []
 
     def look() -> None:
-        found.append([name for name in vars(run("_met", "/rubric/checks.py", CONTENT)) if name == "TABLE"])
+        found.append([name for name in vars(run_author_file("_met", "/rubric/checks.py", CONTENT)) if name == "TABLE"])
 
     threads = [threading.Thread(target=look) for _ in range(2)]
     threads[0].start()

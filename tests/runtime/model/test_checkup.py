@@ -10,7 +10,7 @@ from grader.runtime.model.checkup import (
     REQUIRED,
     TIERS,
     Property,
-    described,
+    isolation_line,
     missing,
     summarised,
 )
@@ -21,14 +21,14 @@ OPEN = (*ALL[:4], Property("net_egress", holds=False, mechanism="no interface bu
 
 def test_a_tier_is_described_with_every_property_and_its_mechanism() -> None:
     """In one line, in the order of the table."""
-    text = described("bubblewrap", ALL)
+    text = isolation_line("bubblewrap", ALL)
     assert text.startswith("bubblewrap (A1): fs_read by mechanism 0; fs_write by mechanism 1; ")
     assert [part.split()[0] for part in text.partition(": ")[2].split("; ")] == list(PROPERTIES)
 
 
 def test_what_is_not_contained_is_said_with_what_was_found() -> None:
     """Loudly, in the long form as in the short one."""
-    assert "; net_egress NOT CONTAINED (eth0); " in described("landlock", OPEN)
+    assert "; net_egress NOT CONTAINED (eth0); " in isolation_line("landlock", OPEN)
     assert summarised("landlock", OPEN) == "landlock, NOT contained: net_egress"
     assert summarised("landlock", ALL) == "landlock, all 11 properties contained"
 
@@ -36,7 +36,7 @@ def test_what_is_not_contained_is_said_with_what_was_found() -> None:
 @pytest.mark.parametrize("properties", [(), ALL])
 def test_no_walls_are_exactly_none(properties: tuple[Property, ...]) -> None:
     """Programs compare the word; people get more of them."""
-    assert described(NO_SANDBOX, properties) == "none"
+    assert isolation_line(NO_SANDBOX, properties) == "none"
     assert "no sandbox" in summarised(NO_SANDBOX, properties)
 
 

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.runtime.model.wording import listed, shown
+from grader.runtime.model.wording import listed, printable
 
 
 @given(st.text(st.characters(exclude_categories=())), st.integers(min_value=3, max_value=100))
 def test_shown_text_is_one_short_printable_line(text: str, limit: int) -> None:
     """For any input, including lone surrogates, the result is printable, encodable and no longer than asked."""
-    line = shown(text, limit)
+    line = printable(text, limit)
     assert line.isprintable()
     assert len(line) <= limit
     assert line.encode("utf-8").decode("utf-8") == line
@@ -30,7 +30,7 @@ def test_shown_text_is_one_short_printable_line(text: str, limit: int) -> None:
 )
 def test_what_is_shown(text: str, line: str) -> None:
     """Letters of any language stay; control characters and surrogates are spelt out; long text loses its middle."""
-    assert shown(text, 20) == line
+    assert printable(text, 20) == line
 
 
 @pytest.mark.parametrize(("names", "phrase"), [(["a"], "a"), (["a", "b"], "a or b"), (["a", "b", "c"], "a, b or c")])

@@ -15,8 +15,8 @@ from grader.runtime.model.submission import StudentFile
 from grader.runtime.programs.executables import (
     find_executable,
     ignored_packages,
-    name_of,
     needed_packages,
+    package_name,
     workspace_of,
 )
 
@@ -157,4 +157,4 @@ def test_a_pipe_in_a_neighbouring_folder_is_not_waited_for(tmp_path: Path) -> No
     """A package that one names is looked for beside others, which may hold anything."""
     (tmp_path / "piped").mkdir()
     os.mkfifo(tmp_path / "piped" / "package.xml")
-    assert name_of(tmp_path / "piped") == "piped"
+    assert package_name(tmp_path / "piped") == "piped"

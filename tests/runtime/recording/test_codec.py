@@ -33,7 +33,7 @@ from grader.runtime.model.trace import (
     Trace,
 )
 from grader.runtime.recording.codec import observation_to_json, trace_to_json
-from grader.runtime.recording.packed import pack, trace_from_json, unpack
+from grader.runtime.recording.packed import pack_trace, trace_from_json, unpack_trace
 
 TIMES = st.integers(min_value=-(2**70), max_value=2**70)
 # Lone surrogates too: a student's bytes may be decoded to anything.
@@ -173,8 +173,8 @@ def test_a_fault_of_an_earlier_version_has_no_details() -> None:
     now = trace_to_json(trace)
     earlier = {**now, "observations": [row[:-1] for row in now["observations"]]}
     expected = (replace(fault, exit_code=None),)
-    assert trace_from_json(earlier).faults() == unpack(json.dumps(earlier).encode()).faults() == expected
-    assert trace_from_json(now).faults() == unpack(pack(trace, [False])).faults() == trace.faults()
+    assert trace_from_json(earlier).faults() == unpack_trace(json.dumps(earlier).encode()).faults() == expected
+    assert trace_from_json(now).faults() == unpack_trace(pack_trace(trace, [False])).faults() == trace.faults()
 
 
 #: Keys and numbers that lead to a value.

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from grader.runtime.model.errors import EvidenceError
 from grader.runtime.model.trace import ClockKind, Message, Trace
-from grader.runtime.recording.packed import Fields, fields_of, pack, unpack, unpack_exactly
+from grader.runtime.recording.packed import Fields, decoded_fields, pack_trace, unpack_exactly, unpack_trace
 
 TWIST = {"linear": {"x": 0.5, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.1}}
 LONG = {"data": "x" * 80}
@@ -31,14 +31,14 @@ def trace(*values: dict[str, Any]) -> Trace:
 
 def packed(value: str, beside: str = "{}") -> bytes:
     """Return a packed trace of two messages, one with the text of its fields given."""
-    whole = pack(trace({"marked": "here"}, {"marked": "beside"}), [False, False])
+    whole = pack_trace(trace({"marked": "here"}, {"marked": "beside"}), [False, False])
     return whole.replace(b'{"marked":"here"}', value.encode()).replace(b'{"marked":"beside"}', beside.encode())
 
 
 def looked_at(data: bytes) -> Any:
     """Return the fields of the first message, every one decoded, or the refusal of the whole."""
     try:
-        (first, *_) = unpack(data).of(Message)
+        (first, *_) = unpack_trace(data).of(Message)
         return dict(first.value)
     except EvidenceError:
         return "refused"
@@ -53,7 +53,7 @@ def exactly(data: bytes) -> Any:
 
 def test_long_fields_are_left_as_they_are_and_short_ones_are_not() -> None:
     """What is worth it stays JSON until somebody looks."""
-    long, short = unpack(pack(trace(TWIST, {"data": 1.5}), [False, False])).of(Message)
+    long, short = unpack_trace(pack_trace(trace(TWIST, {"data": 1.5}), [False, False])).of(Message)
     assert isinstance(long.value, Fields)
     assert type(short.value) is dict
     assert long.value["linear"] == {"x": 0.5, "y": 0.0, "z": 0.0}
@@ -65,7 +65,7 @@ def test_long_fields_are_left_as_they_are_and_short_ones_are_not() -> None:
 @given(st.dictionaries(st.text(max_size=8), ANY, max_size=6))
 def test_quick_and_exact_way_read_the_same(value: dict[str, Any]) -> None:
     """Whatever a message holds, both ways of reading find it, or both refuse it."""
-    data = pack(trace({"fields": "f" * 70, **value}), [False])
+    data = pack_trace(trace({"fields": "f" * 70, **value}), [False])
     assert repr(looked_at(data)) == repr(exactly(data))
 
 
@@ -97,7 +97,7 @@ def test_odd_fields_are_taken_or_refused_as_by_the_exact_way(text: str) -> None:
 def test_odd_numbers_are_numbers_in_long_fields_too() -> None:
     """Not a number and infinity come back wherever they stand."""
     value = {**TWIST, "linear": {"x": math.nan, "y": math.inf, "z": 0.0}}
-    (message,) = unpack(pack(trace(value), [False])).of(Message)
+    (message,) = unpack_trace(pack_trace(trace(value), [False])).of(Message)
     assert math.isnan(message.value["linear"]["x"])
     assert message.value["linear"]["y"] == math.inf
 
@@ -108,7 +108,7 @@ def test_fields_are_equal_by_what_they_hold() -> None:
     assert one == other == {"a": 1, "b": 2}
     assert one != Fields(raw('{"a":1,"b":3}'))
     assert one != 3
-    assert fields_of(raw(json.dumps(LONG))) == LONG
+    assert decoded_fields(raw(json.dumps(LONG))) == LONG
 
 
 def raw(text: str) -> msgspec.Raw:

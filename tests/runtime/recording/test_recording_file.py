@@ -30,7 +30,7 @@ from grader.runtime.model.trace import (
     Trace,
 )
 from grader.runtime.recording.codec import trace_to_json
-from grader.runtime.recording.packed import unpack
+from grader.runtime.recording.packed import unpack_trace
 from grader.runtime.recording.recording_file import packed_trace, recording_bytes, trace_of
 
 FACTS = {"environment": '{"ros_distro": "jazzy"}', "format": "x", "seed": "7"}
@@ -70,7 +70,7 @@ def test_a_trace_comes_back_as_it_was(trace: Trace) -> None:
 @given(TRACES)
 def test_judging_is_given_all_but_the_bytes(trace: Trace) -> None:
     """The quick way gives what the exact way gives."""
-    quick = json.loads(as_text(unpack(packed_trace(kept(trace)))))
+    quick = json.loads(as_text(unpack_trace(packed_trace(kept(trace)))))
     exact = json.loads(as_text(trace))
     for row in exact["observations"]:
         if row[0] in ("message", "delivery", "request", "response"):
@@ -194,7 +194,7 @@ WHOLE = kept(Trace("s", ClockKind.VIRTUAL, 10, tuple(twist_message(i) for i in r
 def test_damage_is_refused_or_harmless(at: int, other: bytes, cut: bool) -> None:
     """Whatever stands in a file, the answer is EvidenceError or a trace, never a crash."""
     damaged = WHOLE[:at] if cut else WHOLE[:at] + other + WHOLE[at + len(other) :]
-    for read in (trace_of, lambda recording: unpack(packed_trace(recording))):
+    for read in (trace_of, lambda recording: unpack_trace(packed_trace(recording))):
         assert isinstance(trace_or_problem(damaged, read), (Trace, EvidenceError))
 
 

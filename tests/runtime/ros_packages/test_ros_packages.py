@@ -25,7 +25,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import Image, PointField
 from std_msgs.msg import Header
 
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.grading.judging.installation import NOT_LENT
 from grader.runtime.lending import LENDABLE, LENT, lent_to
 from grader.runtime.model.quantities import NS_PER_S
@@ -593,7 +593,7 @@ def test_programs_use_them(tmp_path: Path, program: str, logged: list[str], cloc
     file = tmp_path / "node.py"
     logs = 2 if program is PROGRAMS["point"][0] else 1
     file.write_text(HEAD.replace("LOGS", str(logs)) + program)
-    summary = observe(ObserveRequest((file,), 60 * NS_PER_S, clock=clock), lambda _: None)
+    summary = observe_programs(ObserveRequest((file,), 60 * NS_PER_S, clock=clock), lambda _: None)
     assert [fault.text for fault in summary.faults if fault.exit_code != 0] == []
     texts = [record.text for record in summary.records]
     assert texts == logged or (len(texts) == 1 and texts[0] in logged), (texts, summary.lines)

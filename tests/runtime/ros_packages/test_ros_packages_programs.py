@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
@@ -64,7 +64,7 @@ def test_a_program_does_what_the_documentation_promises(file: str, clock: str) -
     for module in told(text, "needs"):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module} is not installed")
-    summary = observe(ObserveRequest((path,), DURATION_NS, clock=clock), lambda _: None)
+    summary = observe_programs(ObserveRequest((path,), DURATION_NS, clock=clock), lambda _: None)
     own = [record for record in summary.records if not record.logger.startswith("message_filters")]
     assert [record.text for record in own] == told(text, "logs"), (summary.faults, summary.lines)
     assert [fault.text for fault in summary.faults if fault.exit_code != 0] == []

@@ -419,9 +419,9 @@ def test_a_setting_that_forbids_namespaces_is_named(tmp_path: Path) -> None:
 def test_the_systems_own_installer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whichever it has; without a known one, that of most."""
     monkeypatch.setattr(shutil, "which", lambda name: name if name == "dnf" else None)
-    assert remedies.install_command("bubblewrap").removeprefix("sudo ") == "dnf install -y bubblewrap"
+    assert remedies.package_command("bubblewrap").removeprefix("sudo ") == "dnf install -y bubblewrap"
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    assert remedies.install_command("bubblewrap").removeprefix("sudo ") == "apt-get install -y bubblewrap"
+    assert remedies.package_command("bubblewrap").removeprefix("sudo ") == "apt-get install -y bubblewrap"
 
 
 # --- whole gradings ---

@@ -8,7 +8,7 @@ import pytest
 
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.simulation import DifferentialDrive, loading
-from grader.runtime.simulation.loading import guarded, made
+from grader.runtime.simulation.loading import guarded, made_simulation
 
 FILE = b"""\
 from dataclasses import dataclass
@@ -28,14 +28,14 @@ SIMULATIONS = {"slow": Slow}
 
 def test_a_built_in_simulation_is_made_with_its_parameters() -> None:
     """As JSON brings them to the worker."""
-    robot = made("differential_drive", "", b"", {"x": 2.5, "frame": "map"})
+    robot = made_simulation("differential_drive", "", b"", {"x": 2.5, "frame": "map"})
     assert isinstance(robot, DifferentialDrive)
     assert (robot.x, robot.frame) == (2.5, "map")
 
 
 def test_an_authors_simulation_is_made_from_the_text_of_its_file() -> None:
     """Lists become tuples again."""
-    assert made("slow", "slow.py", FILE, {"seen": [1, 2]}).seen == (1, 2)  # type: ignore[attr-defined]
+    assert made_simulation("slow", "slow.py", FILE, {"seen": [1, 2]}).seen == (1, 2)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
@@ -51,13 +51,13 @@ def test_an_error_in_the_file_is_told_with_its_line(content: bytes, told: str) -
     """Every time that it is loaded: a failed file is not kept."""
     for _ in range(2):
         with pytest.raises(HarnessError) as error:
-            made("slow", "world.py", content, {})
+            made_simulation("slow", "world.py", content, {})
         assert error.value.message.startswith(told)
 
 
 def test_a_call_without_end_is_ended() -> None:
     """It would take the worker to its limit of processor time, which counts as a fault of the student's nodes."""
-    slow = made("slow", "slow.py", FILE, {})
+    slow = made_simulation("slow", "slow.py", FILE, {})
     with pytest.raises(
         HarnessError, match=r"slow.py:\d+: the simulation `slow` failed: the call took more than 0.05 s"
     ):

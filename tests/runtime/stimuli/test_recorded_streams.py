@@ -19,7 +19,7 @@ from tracing import ODOMETRY
 
 from grader.course.authoring.checking import check_rubric
 from grader.course.classroom.sending import checks_of
-from grader.grading.app.bags import observed, read_given, read_recordings, recordings_digest
+from grader.grading.app.bags import played_bags, read_given, read_recordings, recordings_digest
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest, command_words, request_of, request_to_json
 from grader.grading.rubrics.loader import read_rubric
@@ -341,7 +341,7 @@ def test_a_type_of_the_courses_own(tmp_path: Path) -> None:
 def test_without_a_rubric(tmp_path: Path) -> None:
     """`grade observe` finds the type of a topic, and the topic of a type."""
     bag = write_bag(tmp_path / "bag", {**SCANS, **POSES})
-    assert observed([("/scan", bag)], 1, 2) == (RecordedStream("/scan", SCAN, str(bag), 1, 2),)
-    assert observed([(POSE, bag)], 1, 2) == (RecordedStream("/pose", POSE, str(bag), 1, 2),)
+    assert played_bags([("/scan", bag)], 1, 2) == (RecordedStream("/scan", SCAN, str(bag), 1, 2),)
+    assert played_bags([(POSE, bag)], 1, 2) == (RecordedStream("/pose", POSE, str(bag), 1, 2),)
     with pytest.raises(RecordingError, match=r"expected one topic to play, found /pose \(.*\) and /scan"):
-        observed([("/other", bag)], 1, 2)
+        played_bags([("/other", bag)], 1, 2)

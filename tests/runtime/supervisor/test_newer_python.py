@@ -15,7 +15,7 @@ from decided import grade_until_decided
 from places import REPORTED
 from tiers import NIGHTLY, each, more
 
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import Report
@@ -24,7 +24,7 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.releases import RELEASES
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
 from grader.runtime.recording.codec import trace_to_json
-from grader.runtime.recording.packed import pack, trace_from_json, unpack
+from grader.runtime.recording.packed import pack_trace, trace_from_json, unpack_trace
 from grader.runtime.supervisor.newer_python import NEW_NAMES, NEWER, is_newer, newer_name, with_newer
 from grader.runtime.supervisor.newer_syntax import needs_newer
 
@@ -235,7 +235,7 @@ def test_a_trace_says_what_is_newer_and_keeps_it(tmp_path: Path) -> None:
     )
     trace = with_newer(failed("AttributeError: module 'itertools' has no attribute 'batched'"), str(tmp_path), "jazzy")
     assert trace.newer[0].sentence.startswith("a.py:3: itertools.batched came with Python 3.12; ROS 2 jazzy runs")
-    assert trace_from_json(trace_to_json(trace)) == trace == unpack(pack(trace, [False]))
+    assert trace_from_json(trace_to_json(trace)) == trace == unpack_trace(pack_trace(trace, [False]))
 
 
 @older
@@ -337,5 +337,5 @@ def test_a_mistake_beside_it_costs_the_points(tmp_path: Path) -> None:
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 def test_observe_says_it_too(clock: str) -> None:
     """As a note beside the fault."""
-    summary = observe(ObserveRequest((REPORTED / "pep701.py",), NS_PER_S, clock=clock), lambda _: None)
+    summary = observe_programs(ObserveRequest((REPORTED / "pep701.py",), NS_PER_S, clock=clock), lambda _: None)
     assert any("ROS 2 jazzy runs on Python 3.12" in note for note in summary.notes), summary.notes

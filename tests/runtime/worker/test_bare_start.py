@@ -12,7 +12,7 @@ import pytest
 
 from grader.runtime.plan import PlannedStart
 from grader.runtime.programs.beginning import beginning_of
-from grader.runtime.programs.inert import read
+from grader.runtime.programs.inert import read_inert
 from grader.runtime.worker import bare_start
 
 NODE = "from rclpy.node import Node\nclass Talker(Node): pass\n"
@@ -32,7 +32,7 @@ HELPED = {
 
 def bare_arguments(root: Path, seen: str, file: str, given: PlannedStart | None = None) -> tuple[str, ...]:
     """How a file is started of which the contained process has read what it begins."""
-    tree = read((root / file).read_bytes())
+    tree = read_inert((root / file).read_bytes())
     begins = beginning_of(tree) if isinstance(tree, ast.Module) else None
     return bare_start.bare_arguments(root, seen, file, begins, given)
 

@@ -17,7 +17,7 @@ pytest.importorskip("rclpy")
 from hostile import planned, record
 from side_by_side import rows_of
 
-from grader.grading.judging.judge_run import unheard
+from grader.grading.judging.judge_run import notes_on_unheard
 from grader.runtime.model.quantities import NS_PER_S
 
 pytestmark = pytest.mark.ros
@@ -139,7 +139,7 @@ def test_a_message_after_a_wait_is_not(trace: Trace, program: str, clock: str) -
     assert trace.harness_problem == ""
     assert early(trace)
     assert not any(early(trace))
-    assert unheard(trace) == ()
+    assert notes_on_unheard(trace) == ()
 
 
 def test_what_a_message_of_the_same_instant_causes_is_not_early(run: Callable[..., Trace]) -> None:
@@ -199,7 +199,7 @@ def test_all_of_a_burst_is_early(run: Callable[..., Trace], clock: str) -> None:
     assert early(trace)[0]
     if clock == "virtual":
         assert all(early(trace))
-    assert unheard(trace)[0].startswith(
+    assert notes_on_unheard(trace)[0].startswith(
         "/count: all messages were" if all(early(trace)) else "/count: the first message"
     )
 

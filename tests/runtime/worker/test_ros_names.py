@@ -24,7 +24,7 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import Trace
 from grader.runtime.session import RecordingSession
 from grader.runtime.worker.observer import PARTICIPANTS
-from grader.runtime.worker.ros_names import asked, listed
+from grader.runtime.worker.ros_names import ask_for_all, asked
 
 REFUSED = [
     "",
@@ -79,8 +79,8 @@ def test_a_question_that_is_refused_has_no_answer() -> None:
 
     assert asked(refuse, "//a", nothing=["none"]) == ["none"]
     with pytest.raises(RuntimeError):
-        listed(refuse)
-    assert listed(lambda: [b"\xff".decode()]) == []
+        ask_for_all(refuse)
+    assert ask_for_all(lambda: [b"\xff".decode()]) == []
 
 
 @pytest.mark.parametrize("name", ["antigravity/msg/Foo", "this/msg/Foo", "json/msg/Foo", "grader/msg/Foo", "a/msg/Foo"])

@@ -9,7 +9,7 @@ from decided import grade_until_decided, verdicts
 from tiers import each
 
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade
+from grader.grading.app.start import grade_once
 from grader.grading.model.exercise import Outcome
 
 pytestmark = pytest.mark.ros
@@ -121,7 +121,7 @@ def test_a_loop_is_closed_and_is_the_same_in_each_run(tmp_path: Path) -> None:
     """Noise, echoes at once and a service: to the last digit, whatever the machine does meanwhile."""
     found = []
     for _ in range(2):
-        report = grade(request(tmp_path), lambda _: None, pictures=False)
+        report = grade_once(request(tmp_path), lambda _: None, pictures=False)
         found.append({name: (v.outcome, v.reason, v.evidence) for name, v in verdicts(report).items()})
     assert found[0] == found[1]
     assert {outcome for outcome, _, _ in found[0].values()} == {Outcome.MET}, found[0]
@@ -175,7 +175,7 @@ def test_a_turtle_has_the_messages_of_turtlesim(tmp_path: Path) -> None:
     """They come with the grader, also for the student's node."""
     made = request(tmp_path, follow=DRIVER)
     (tmp_path / "follow.yaml").write_text(TURTLE, encoding="utf-8")
-    found = verdicts(grade(made, lambda _: None, pictures=False))
+    found = verdicts(grade_once(made, lambda _: None, pictures=False))
     assert {name: v.outcome for name, v in found.items()} == {"moved": Outcome.MET}, found
 
 
@@ -201,7 +201,7 @@ def test_a_loop_is_closed_on_the_wall_clock(tmp_path: Path) -> None:
 )
 def test_an_error_in_a_simulation_leaves_all_undecided(tmp_path: Path, old: str, new: str, told: str) -> None:
     """It arises only once the student's node has said something, so that reading the rubric could not find it."""
-    report = grade(request(tmp_path, world=WORLD.replace(old, new)), lambda _: None, pictures=False)
+    report = grade_once(request(tmp_path, world=WORLD.replace(old, new)), lambda _: None, pictures=False)
     assert not report.final
     for verdict in verdicts(report).values():
         assert verdict.outcome is Outcome.UNDECIDED
@@ -211,7 +211,7 @@ def test_an_error_in_a_simulation_leaves_all_undecided(tmp_path: Path, old: str,
 @pytest.mark.long
 def test_a_node_that_floods_a_simulation_is_at_fault_itself(tmp_path: Path) -> None:
     """The recording ends at its limit, and is judged."""
-    report = grade(request(tmp_path, follow=FLOOD), lambda _: None, pictures=False)
+    report = grade_once(request(tmp_path, follow=FLOOD), lambda _: None, pictures=False)
     found = verdicts(report)["stays"]
     assert report.final
     assert found.outcome is Outcome.NOT_MET

@@ -20,7 +20,7 @@ from distributed import Client, Future, KilledWorker, Security
 import grader
 from grader.course.classroom.cluster import workers as remote
 from grader.course.classroom.local import Attempt, ClassScheduler, OnStep, Task, failed_attempt
-from grader.course.classroom.messages import Fitness, Terms, pack, unpack
+from grader.course.classroom.messages import Fitness, Terms, pack_message, unpack_message
 from grader.course.classroom.receiving import other_version
 from grader.course.classroom.sending import answer_in, files_wanted, job_for, store_result, terms_of
 from grader.runtime.model.dataclass import dataclass
@@ -131,9 +131,9 @@ class WorkerPool:
             elif isinstance(found, (str, importlib.metadata.PackageNotFoundError)):
                 problem = other_version(self._version, found if isinstance(found, str) else "")
                 self._known[address] = Fitness(f"worker {address}", problem, _remedy(self._version))
-        for address, reply in self._run(remote.inspect, self._isolation, right).items():
+        for address, reply in self._run(remote.inspect_worker, self._isolation, right).items():
             if isinstance(reply, bytes):
-                self._known[address] = unpack(reply, Fitness)
+                self._known[address] = unpack_message(reply, Fitness)
             elif not isinstance(reply, OSError):  # the worker has left in the meantime
                 self._known[address] = Fitness(f"worker {address}", f"the grader failed: {type(reply).__name__}")
 
@@ -185,7 +185,7 @@ class Dispatcher:
         self._client = client
         self._worker_pool = worker_pool
         self._jobs = jobs
-        self._terms = pack(terms)
+        self._terms = pack_message(terms)
         self._on_step = on_step
         self._topic = topic
         self._waiting: deque[_Sending] = deque()
@@ -249,7 +249,7 @@ class Dispatcher:
             if isinstance(job, Attempt):
                 yield job
             else:
-                self._send(sending, pack(job), self._worker_pool.only(fit), near=bool(fit))
+                self._send(sending, pack_message(job), self._worker_pool.only(fit), near=bool(fit))
 
     def _send(self, sending: _Sending, job: bytes, only: tuple[str, ...], *, near: bool) -> None:
         self._count += 1
@@ -260,7 +260,7 @@ class Dispatcher:
             self._names.add(sending.task.name)
         sending.payloads = [self._payload(data, near=near) for data in (self._terms, job)]
         sending.future = self._client.submit(
-            remote.grade,
+            remote.grade_packed_job,
             grader.__version__,
             *sending.payloads,
             self._topic,
@@ -384,7 +384,7 @@ def connected(
     The place is the address of the scheduler, such as `tcp://host:8786`, or a scheduler file; for `jobs` and `warn` see
     `ClusterScheduler`.
     """
-    address = address_of(place)
+    address = scheduler_address(place)
     if os.environ.get("GRADER_DEBUG") != "1":
         for name in _LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL)  # the grader reports errors itself
@@ -395,7 +395,7 @@ def connected(
         client.close(timeout=_CLOSE_S)
 
 
-def address_of(place: str) -> str:
+def scheduler_address(place: str) -> str:
     """Return the scheduler's address, given as such or in a scheduler file; raises EnvironmentFault."""
     path = Path(place)
     if ":" in place and not path.is_file():

@@ -7,7 +7,7 @@ import socket
 
 from distributed import Worker, get_worker
 
-from grader.course.classroom.messages import GradingJob, pack, unpack
+from grader.course.classroom.messages import GradingJob, pack_message, unpack_message
 from grader.course.classroom.receiving import UnwantedError, answer, fitness
 from grader.runtime.model.errors import HarnessError
 
@@ -16,12 +16,12 @@ NAME, STEP = "name", "step"
 _UNWANTED = ("cancelled", "released", "forgotten")
 
 
-async def inspect(isolation: str, dask_worker: Worker) -> bytes:
+async def inspect_worker(isolation: str, dask_worker: Worker) -> bytes:
     """Report whether this worker can grade, as a packed `Fitness`; Dask supplies it because of the parameter's name."""
-    return pack(await asyncio.to_thread(fitness, isolation, _machine(dask_worker)))
+    return pack_message(await asyncio.to_thread(fitness, isolation, _machine(dask_worker)))
 
 
-def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
+def grade_packed_job(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
     """Grade a submission, and return a packed `JobResult`.
 
     The version is that of the requesting machine, terms and job are packed, and events of progress go to the topic.
@@ -34,7 +34,7 @@ def grade(version: str, terms: bytes, job: bytes, topic: str) -> bytes:
         if task is None or task.state in _UNWANTED:
             raise UnwantedError
         try:
-            name = unpack(job, GradingJob).name
+            name = unpack_message(job, GradingJob).name
         except HarnessError:
             return
         worker.log_event(topic, {NAME: name, STEP: step})

@@ -20,7 +20,7 @@ from canvasapi.exceptions import (
 )
 from canvasapi.requester import Requester
 
-from grader.course.classroom.uploading.marks import Account, PlatformError, RefusedMarkError, said
+from grader.course.classroom.uploading.marks import Account, PlatformError, RefusedMarkError, platform_words
 from grader.course.classroom.uploading.web import Patient, documented
 
 TOKEN = "CANVAS_TOKEN"  # noqa: S105  the name of the variable
@@ -80,7 +80,7 @@ class Canvas:
         try:
             self._asked(lambda: submission.edit(**values), passed=(BadRequest, UnprocessableEntity))
         except (BadRequest, UnprocessableEntity) as error:
-            raise RefusedMarkError(said(str(error).encode())) from None
+            raise RefusedMarkError(platform_words(str(error).encode())) from None
 
     def _found(self, what: str, ask: Callable[[], _Made]) -> _Made:
         try:
@@ -102,7 +102,7 @@ class Canvas:
             raise PlatformError(f"{self._url}: too many requests", "run the same command again later") from None
         except (Unauthorized, Forbidden) as error:
             hint = "use a token of somebody who may grade in this course"
-            raise PlatformError(f"{self._url}: not allowed: {said(str(error).encode())}", hint) from None
+            raise PlatformError(f"{self._url}: not allowed: {platform_words(str(error).encode())}", hint) from None
         except (CanvasException, requests.RequestException, ValueError) as error:
             hint = "check --url and the network; run the same command again to continue"
             raise PlatformError(f"{self._url}: no usable answer: {type(error).__name__}: {error}"[:300], hint) from None

@@ -207,7 +207,7 @@ class Sent:
     wrong: tuple[str, ...]  # whose score is another than the one sent, as read back
 
 
-def send(changes: Iterable[Change], platform: Platform, tell: Callable[[str], None]) -> Sent:
+def send_marks(changes: Iterable[Change], platform: Platform, tell: Callable[[str], None]) -> Sent:
     """Send what is needed, one person after the other, and read the scores back.
 
     Raises PlatformError with the number sent so far if the platform stops answering; the same upload then goes on.
@@ -237,7 +237,7 @@ def _wrong(sent: Iterable[Change], now: Mapping[int, float]) -> Iterator[str]:
             yield f"{change.mark.name}: sent {change.mark.score:g}, the platform has {there}"
 
 
-def said(data: bytes, limit: int = 200) -> str:
+def platform_words(data: bytes, limit: int = 200) -> str:
     """Return what a platform says in an error, from JSON of any shape or the text itself, in one short line."""
     try:
         found = json.loads(data)

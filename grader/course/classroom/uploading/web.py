@@ -37,7 +37,7 @@ class Patient(HTTPAdapter):
         return super().send(request, *args, **options)
 
 
-def address_of(text: str) -> str:
+def platform_address(text: str) -> str:
     """Return the address of a platform without a slash at its end; raises ClassError unless it is safe for a token."""
     parts = urlsplit(text.strip())
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.query or parts.fragment or parts.username:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 
 from grader.course.mutation.operators import flow, values, words
-from grader.course.mutation.operators.program import Candidate, Mutation, ParsedProgram, short
+from grader.course.mutation.operators.program import Candidate, Mutation, ParsedProgram, in_one_line
 
 Operator = Callable[[ParsedProgram], Iterator[Mutation]]
 #: Operator name -> operator; its docstring describes the mistake that it imitates.
@@ -52,7 +52,7 @@ def mutants_of(source: str, file: str, operators: Mapping[str, Operator] = OPERA
             if means is None or means in seen:
                 continue
             seen.add(means)
-            detail = short(change.detail, 90)
+            detail = in_one_line(change.detail, 90)
             id_ = f"{file}:{program.line(change.at)}:{name}:{detail}"
             counts[id_] += 1
             again = f" #{counts[id_]}" if counts[id_] > 1 else ""

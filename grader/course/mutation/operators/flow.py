@@ -14,12 +14,12 @@ from grader.course.mutation.operators.program import (
     Mutation,
     ParsedProgram,
     called,
-    short,
+    in_one_line,
     without_comma,
 )
 
 
-def lines_of(function: cst.FunctionDef) -> Sequence[cst.BaseStatement]:
+def statements_of(function: cst.FunctionDef) -> Sequence[cst.BaseStatement]:
     """Return the statements of a function's body, in order, without its docstring."""
     if not isinstance(function.body, cst.IndentedBlock):
         return ()
@@ -29,18 +29,18 @@ def lines_of(function: cst.FunctionDef) -> Sequence[cst.BaseStatement]:
 
 def at_top(function: cst.FunctionDef, *texts: str) -> tuple[Edit, ...]:
     """Return the edit that inserts statements at the start of a function; none if its body is on the same line."""
-    lines = lines_of(function)
+    lines = statements_of(function)
     return ((lines[0], cst.FlattenSentinel([*map(cst.parse_statement, texts), lines[0]])),) if lines else ()
 
 
-def parameters(function: cst.FunctionDef) -> list[str]:
+def parameter_names(function: cst.FunctionDef) -> list[str]:
     """Return the names of a function's parameters."""
     return [parameter.name.value for parameter in function.params.params]
 
 
 def owner(function: cst.FunctionDef) -> str:
     """Return an object where a function can store state between calls: `self`, or the function itself."""
-    names = parameters(function)
+    names = parameter_names(function)
     return names[0] if names[:1] == ["self"] else function.name.value
 
 
@@ -127,7 +127,7 @@ def repeated_call(program: ParsedProgram) -> Iterator[Mutation]:
         if m.matches(line, m.SimpleStatementLine(body=[m.Expr(m.Call())])):
             call = program.all(cst.Call, line)[0]
             if called(call) in _REPEATED:
-                yield Mutation(line, f"twice {short(program.code(call))}", _twice(line))
+                yield Mutation(line, f"twice {in_one_line(program.code(call))}", _twice(line))
 
 
 def repeated_entity(program: ParsedProgram) -> Iterator[Mutation]:
@@ -135,7 +135,7 @@ def repeated_entity(program: ParsedProgram) -> Iterator[Mutation]:
     for line in program.all(cst.SimpleStatementLine):
         calls = [call for call in program.all(cst.Call, line) if called(call) in _ENTITIES]
         if calls:
-            yield Mutation(line, f"two of {short(program.code(calls[0]))}", _twice(line))
+            yield Mutation(line, f"two of {in_one_line(program.code(calls[0]))}", _twice(line))
 
 
 def _twice(line: cst.SimpleStatementLine) -> tuple[Edit, ...]:
@@ -148,7 +148,7 @@ def wrong_order(program: ParsedProgram) -> Iterator[Mutation]:
         for one, other in zip(block.body, block.body[1:], strict=False):
             if isinstance(one, cst.SimpleStatementLine) and _leads_to(program, one, other):
                 edits = ((one, other), (other, one))
-                texts = (short(program.code(line).strip(), 30) for line in (one, other))
+                texts = (in_one_line(program.code(line).strip(), 30) for line in (one, other))
                 yield Mutation(one, " after ".join(texts), edits)
 
 
@@ -190,11 +190,11 @@ def frozen_value(program: ParsedProgram) -> Iterator[Mutation]:
             target, value = assign.targets[0].target, assign.value
             own = isinstance(target, (cst.Name, cst.Attribute)) and alone(program, assign)
             if own and not isinstance(value, (cst.Integer, cst.Float, cst.SimpleString)):
-                yield Mutation(assign, f"once {short(program.code(assign))}", _kept(program, function, value))
+                yield Mutation(assign, f"once {in_one_line(program.code(assign))}", _kept(program, function, value))
         for call in program.all(cst.Call, function):
             if called(call) == "publish" and call.args and isinstance(call.args[0].value, cst.Call):
                 value = call.args[0].value
-                yield Mutation(call, f"once {short(program.code(value))}", _kept(program, function, value))
+                yield Mutation(call, f"once {in_one_line(program.code(value))}", _kept(program, function, value))
 
 
 def first_message_only(program: ParsedProgram) -> Iterator[Mutation]:
@@ -212,7 +212,7 @@ def one_behind(program: ParsedProgram) -> Iterator[Mutation]:
 def _hearing(program: ParsedProgram, detail: str, text: str) -> Iterator[Mutation]:
     """Yield the mutations that begin the callback of each subscription with a statement about its message."""
     for function in program.handed_to("create_subscription"):
-        message = (parameters(function) or ["self"])[-1]
+        message = (parameter_names(function) or ["self"])[-1]
         if message != "self":
             said = f"{function.name.value} {detail.format(message=message)}"
             yield Mutation(function, said, at_top(function, text.format(own=owner(function), message=message)))

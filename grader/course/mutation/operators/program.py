@@ -97,7 +97,7 @@ class ParsedProgram:
 
     def arguments(self, name: str, *creators: str) -> list[tuple[cst.Call, cst.BaseExpression]]:
         """Return the calls of these creating methods that pass a parameter, each with what it passes."""
-        given = ((call, argument(call, name)) for call in self.calls(*creators))
+        given = ((call, passed_argument(call, name)) for call in self.calls(*creators))
         return [(call, value) for call, value in given if value is not None]
 
     def constant(self, expression: cst.BaseExpression | None) -> cst.BaseExpression | None:
@@ -126,7 +126,7 @@ class ParsedProgram:
         return self._functions(callback for _, callback in self.arguments("callback", creator))
 
     def _functions(self, handed: Iterable[cst.BaseExpression]) -> list[cst.FunctionDef]:
-        names = {last_name(expression) for expression in handed}
+        names = {last_part(expression) for expression in handed}
         return [function for function in self.all(cst.FunctionDef) if function.name.value in names]
 
     def importing(self, line: str) -> tuple[Edit, ...]:
@@ -158,7 +158,7 @@ class ParsedProgram:
 
     def without(self, node: cst.CSTNode) -> Mutation:
         """Return the mutation without a statement."""
-        return Mutation(node, f"no {short(self.code(node))}", ((node, cst.Pass()),))
+        return Mutation(node, f"no {in_one_line(self.code(node))}", ((node, cst.Pass()),))
 
 
 class _Replacing(cst.CSTTransformer):
@@ -179,17 +179,17 @@ def _joined(one: Replacement, other: Replacement) -> Replacement:
 
 def called(call: cst.Call) -> str:
     """Return the last part of the called name; empty if there is none."""
-    return last_name(call.func)
+    return last_part(call.func)
 
 
-def last_name(expression: cst.BaseExpression) -> str:
+def last_part(expression: cst.BaseExpression) -> str:
     """Return `b` for `a.b` and for `b`; empty for anything without a name."""
     if isinstance(expression, cst.Attribute):
         return expression.attr.value
     return expression.value if isinstance(expression, cst.Name) else ""
 
 
-def argument(call: cst.Call, name: str) -> cst.BaseExpression | None:
+def passed_argument(call: cst.Call, name: str) -> cst.BaseExpression | None:
     """Return what is passed for a parameter of a creating method, by name or position; None if nothing is."""
     for arg in call.args:
         if arg.keyword is not None and arg.keyword.value == name:
@@ -205,7 +205,7 @@ def without_comma(items: Sequence[Node]) -> list[Node]:
     return [*items[:-1], items[-1].with_changes(comma=cst.MaybeSentinel.DEFAULT)] if items else []
 
 
-def text_of(node: cst.CSTNode | None) -> str | None:
+def plain_string(node: cst.CSTNode | None) -> str | None:
     """Return the value of a plain string; None for anything else."""
     if not isinstance(node, cst.SimpleString) or isinstance(node.evaluated_value, bytes):
         return None
@@ -223,12 +223,12 @@ def is_docstring(program: ParsedProgram, node: cst.CSTNode) -> bool:
     return isinstance(next(program.above(node), None), cst.Expr)
 
 
-def number_of(node: cst.CSTNode | None) -> float | int | None:
+def literal_number(node: cst.CSTNode | None) -> float | int | None:
     """Return the value of a number literal; None for anything else."""
     return node.evaluated_value if isinstance(node, (cst.Integer, cst.Float)) else None
 
 
-def number(value: float) -> cst.BaseExpression:
+def number_literal(value: float) -> cst.BaseExpression:
     """Return a number literal without floating-point noise."""
     text = repr(value) if isinstance(value, int) else repr(float(f"{value:.12g}"))
     return cst.parse_expression(text)
@@ -236,10 +236,10 @@ def number(value: float) -> cst.BaseExpression:
 
 def into(before: str, after: str) -> str:
     """Return `before -> after`, short and on one line."""
-    return f"{short(before)} -> {short(after)}"
+    return f"{in_one_line(before)} -> {in_one_line(after)}"
 
 
-def short(text: str, limit: int = 40) -> str:
+def in_one_line(text: str, limit: int = 40) -> str:
     """Shorten a text to one line."""
     line = " ".join(text.split())
     return line if len(line) <= limit else f"{line[: limit - 1]}…"

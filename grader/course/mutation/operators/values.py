@@ -12,8 +12,8 @@ from grader.course.mutation.operators.program import (
     ParsedProgram,
     called,
     into,
-    number,
-    number_of,
+    literal_number,
+    number_literal,
     without_comma,
 )
 
@@ -110,7 +110,7 @@ def constant_less(program: ParsedProgram) -> Iterator[Mutation]:
 def _off(program: ParsedProgram, side: int) -> Iterator[Mutation]:
     for node, value in _numbers(program):
         off = value + side if isinstance(value, int) else value * (1 + 0.1 * side) or 0.1 * side
-        yield program.replacing(node, number(off))
+        yield program.replacing(node, number_literal(off))
 
 
 def sign(program: ParsedProgram) -> Iterator[Mutation]:
@@ -120,7 +120,7 @@ def sign(program: ParsedProgram) -> Iterator[Mutation]:
         if isinstance(above, cst.UnaryOperation) and isinstance(above.operator, cst.Minus):
             yield program.replacing(above, node, at=node)
         elif value:
-            yield Mutation(node, into(program.code(node), f"-{program.code(node)}"), ((node, number(-value)),))
+            yield Mutation(node, into(program.code(node), f"-{program.code(node)}"), ((node, number_literal(-value)),))
 
 
 def whole_number(program: ParsedProgram) -> Iterator[Mutation]:
@@ -186,7 +186,7 @@ def _numbers(program: ParsedProgram) -> Iterator[tuple[cst.CSTNode, float | int]
     depths = {profile for _, profile in program.arguments("qos_profile", "create_publisher", "create_subscription")}
     depths |= {arg.value for call in program.calls("QoSProfile") for arg in call.args}
     for node in [*program.all(cst.Integer), *program.all(cst.Float)]:
-        value = number_of(node)
+        value = literal_number(node)
         if value is not None and node not in depths and not any(above in depths for above in program.above(node)):
             yield node, value
 

@@ -13,12 +13,12 @@ from grader.course.mutation.operators.program import (
     Candidate,
     Edit,
     ParsedProgram,
-    argument,
     called,
+    passed_argument,
+    plain_string,
     string,
-    text_of,
 )
-from grader.course.mutation.operators.words import names
+from grader.course.mutation.operators.words import name_places
 
 
 def renamed_classes(program: ParsedProgram) -> str:
@@ -62,7 +62,7 @@ def renamed_nodes(program: ParsedProgram) -> str:
     """The node has another name."""
     edits: list[Edit] = []
     for call in program.calls("__init__", "Node", "create_node"):
-        name = text_of(call.args[0].value) if call.args else None
+        name = plain_string(call.args[0].value) if call.args else None
         if name is not None and (called(call) != "__init__" or "super" in program.code(call.func)):
             edits.append((call.args[0].value, string(f"{name}_of_mine")))
     return program.changed(edits)
@@ -136,7 +136,7 @@ def windows_lines(program: ParsedProgram) -> str:
 
 def other_topic_form(program: ParsedProgram) -> str:
     """Absolute names of topics and services are relative, and relative ones absolute."""
-    edits = [(node, string(name[1:] if name.startswith("/") else f"/{name}")) for node, name in names(program)]
+    edits = [(node, string(name[1:] if name.startswith("/") else f"/{name}")) for node, name in name_places(program)]
     return program.changed([(old, new) for old, new in edits if "~" not in new.value])
 
 
@@ -200,7 +200,11 @@ def loop_in_thread(program: ParsedProgram) -> str:
     lines = [line for line in program.all(cst.SimpleStatementLine) if _spun(program, line)]
     if len(timers) != 1 or len(lines) != 1:
         return _same(program)
-    timer, callback, pause = timers[0], argument(timers[0], "callback"), argument(timers[0], "timer_period_sec")
+    timer, callback, pause = (
+        timers[0],
+        passed_argument(timers[0], "callback"),
+        passed_argument(timers[0], "timer_period_sec"),
+    )
     if callback is None or pause is None or "self" in program.code(pause):
         return _same(program)
     made = program.enclosing(timer, cst.SimpleStatementLine)

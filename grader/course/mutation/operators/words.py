@@ -8,20 +8,20 @@ from itertools import combinations
 
 import libcst as cst
 
-from grader.course.mutation.operators.flow import at_top, lines_of, parameters
+from grader.course.mutation.operators.flow import at_top, parameter_names, statements_of
 from grader.course.mutation.operators.program import (
     CREATORS,
     LEVELS,
     Edit,
     Mutation,
     ParsedProgram,
-    argument,
     called,
+    in_one_line,
     into,
     is_docstring,
-    short,
+    passed_argument,
+    plain_string,
     string,
-    text_of,
 )
 
 _WORD = re.compile(r"(?<![%{\\\w/~.])[A-Za-z]{3,}")
@@ -48,8 +48,8 @@ def log_every_message(program: ParsedProgram) -> Iterator[Mutation]:
     """A report with each message instead of by a timer."""
     for callback in program.handed_to("create_subscription"):
         for timer in program.handed_to("create_timer"):
-            lines = lines_of(callback)
-            if lines and parameters(timer) == ["self"] and parameters(callback)[:1] == ["self"]:
+            lines = statements_of(callback)
+            if lines and parameter_names(timer) == ["self"] and parameter_names(callback)[:1] == ["self"]:
                 last = lines[-1]
                 added = cst.FlattenSentinel([last, cst.parse_statement(f"self.{timer.name.value}()")])
                 yield Mutation(callback, f"{callback.name.value} calls {timer.name.value}", ((last, added),))
@@ -58,7 +58,7 @@ def log_every_message(program: ParsedProgram) -> Iterator[Mutation]:
 def text(program: ParsedProgram) -> Iterator[Mutation]:
     """A misspelt word in a log, an answer or a format."""
     for node in program.all(cst.SimpleString):
-        old = text_of(node)
+        old = plain_string(node)
         # names of topics, nodes and files have no spaces
         prose = old is not None and " " in old.strip() and not is_docstring(program, node)
         if old is not None and prose and (after := _misspelt(old)):
@@ -81,7 +81,7 @@ def rounding(program: ParsedProgram) -> Iterator[Mutation]:
         if spec.endswith("f") and spec != ".0f":
             yield program.replacing(part, part.with_changes(format_spec=[cst.FormattedStringText(".0f")]))
     for node in program.all(cst.SimpleString):
-        old = text_of(node)
+        old = plain_string(node)
         if old is not None and (match := re.search(r"%\.[1-9]f", old)):
             after = old[: match.start()] + "%.0f" + old[match.end() :]
             yield Mutation(node, into(old, after), ((node, string(after)),))
@@ -90,7 +90,7 @@ def rounding(program: ParsedProgram) -> Iterator[Mutation]:
 def missing_value(program: ParsedProgram) -> Iterator[Mutation]:
     """A text without the value."""
     for part in program.all(cst.FormattedStringExpression):
-        yield Mutation(part, f"no {short(program.code(part))}", ((part, cst.FormattedStringText("?")),))
+        yield Mutation(part, f"no {in_one_line(program.code(part))}", ((part, cst.FormattedStringText("?")),))
 
 
 def _logs(program: ParsedProgram) -> list[cst.Call]:
@@ -147,7 +147,7 @@ def topic_private(program: ParsedProgram) -> Iterator[Mutation]:
 
 def topic_swapped(program: ParsedProgram) -> Iterator[Mutation]:
     """Two topics swapped: the node subscribes to the topic that it should publish, and the other way round."""
-    for (one, name), (other, other_name) in combinations(names(program), 2):
+    for (one, name), (other, other_name) in combinations(name_places(program), 2):
         if name != other_name:
             yield Mutation(one, f"{name} <-> {other_name}", ((one, string(other_name)), (other, string(name))))
 
@@ -178,26 +178,26 @@ def stamped_type(program: ParsedProgram) -> Iterator[Mutation]:
 def message_type_once(program: ParsedProgram) -> Iterator[Mutation]:
     """A wrong type at only one publisher or subscription of a topic."""
     for call in program.calls(*CREATORS):
-        given = argument(call, CREATORS[called(call)][0])
+        given = passed_argument(call, CREATORS[called(call)][0])
         if isinstance(given, cst.Name) and given.value in _TWINS:
             package, twin = _TWINS[given.value]
             edits = ((given, cst.Name(twin)), *program.importing(f"from {package} import {twin}"))
             yield Mutation(call, f"{called(call)} {into(given.value, twin)}", edits)
 
 
-def names(program: ParsedProgram) -> list[tuple[cst.SimpleString, str]]:
+def name_places(program: ParsedProgram) -> list[tuple[cst.SimpleString, str]]:
     """Return the places that name topics and services, without duplicates."""
     found: dict[cst.SimpleString, str] = {}
     for call in program.calls(*_NAMED):
-        node = program.constant(argument(call, _NAMED[called(call)]))
-        name = text_of(node)
+        node = program.constant(passed_argument(call, _NAMED[called(call)]))
+        name = plain_string(node)
         if isinstance(node, cst.SimpleString) and name:
             found[node] = name
     return list(found.items())
 
 
 def _renamed(program: ParsedProgram, rename: Callable[[str], str]) -> Iterator[Mutation]:
-    for node, name in names(program):
+    for node, name in name_places(program):
         yield Mutation(node, into(name, rename(name)), ((node, string(rename(name))),))
 
 

@@ -30,12 +30,12 @@ from grader.grading.judging.values import (
     broken_rules,
     published,
     rules_text,
-    shown,
+    shown_value,
     value_at,
 )
 from grader.grading.model.chart import Look, Panel, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
-from grader.grading.model.wording import listed, moment, nearest, number, quote, span
+from grader.grading.model.wording import first_few, moment, nearest, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import DurationNs, FieldOf, counted, seconds
@@ -202,8 +202,10 @@ class ActionFeedback:
         for before, after in pairwise(mine):
             sizes = _size(before, self.grows), _size(after, self.grows)
             if sizes[0] is None or sizes[1] is None or not sizes[1] > sizes[0]:
-                found = shown(_held(after, self.grows))
-                return f"{self.grows} is {found} at {moment(after.t_ns)}, after {shown(_held(before, self.grows))}"
+                found = shown_value(_held(after, self.grows))
+                return (
+                    f"{self.grows} is {found} at {moment(after.t_ns)}, after {shown_value(_held(before, self.grows))}"
+                )
         return ""
 
     def _pace_flaw(self, mine: Sequence[Message]) -> str:
@@ -264,7 +266,7 @@ def explain_no_action(trace: Trace, action: str) -> Finding:
     if action in seen:
         raise HarnessError(f"{action}: the recording sends no goal to it")
     near = nearest(action, seen) or (seen[0] if len(seen) == 1 else None)
-    found = f"; seen: {listed(seen)}" if seen else ""
+    found = f"; seen: {first_few(seen)}" if seen else ""
     hint = f"name the action {action} instead of {quote(near)}" if near else ""
     reason = f"{action}: no action server in {observed(trace)}{found}"
     problem = ProblemKind.OTHER_NAME if seen else ProblemKind.ABSENT
@@ -346,8 +348,8 @@ class LifecycleStates:
         if self.topic is not None:
             lanes.add(self.topic)
             lanes.dots(self.topic, ((m.t_ns, "") for m in published(trace, self.topic)), Tone.MAIN)
-        said = f"Transitions: {listed([_label(c) for c in changes], 8) or 'none'}; "
-        said += f"states: {listed([_state(c) for c in asked], 8) or 'none requested'}."
+        said = f"Transitions: {first_few([_label(c) for c in changes], 8) or 'none'}; "
+        said += f"states: {first_few([_state(c) for c in asked], 8) or 'none requested'}."
         cases = [drawn_case(a, b, "active", Tone.GOOD) for a, b in _active(changes, trace.stop_ns)]
         panels = ((lanes.panel(self.node or "the node"), said),)
         return Drawing(panels=panels, cases=tuple(cases), title="Transitions and states")

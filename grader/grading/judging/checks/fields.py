@@ -26,7 +26,7 @@ from grader.grading.judging.values import (
     number_at,
     published,
     published_numbers,
-    shown,
+    shown_value,
     text_at,
     value_at,
 )
@@ -98,7 +98,7 @@ class EqualFields:
         if paths[0] not in got:
             reason = f"{moment(first.t_ns)}, {self.topic}: {quote(first.type)} has no field {paths[0]}"
             return not_met(reason, evidence, problem=ProblemKind.NO_FIELD)
-        found = ", ".join(f"{path} is {shown(value)}" for path, value in got.items())
+        found = ", ".join(f"{path} is {shown_value(value)}" for path, value in got.items())
         brief = f"{self.topic}: {found}, expected {', '.join(rules[path].wanted for path in got)}"
         share = "all" if len(wrong) == len(messages) else f"{len(wrong)} of"
         where = "the only message" if len(messages) == 1 else f"{share} {len(messages)} messages"

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from grader.grading.judging.findings import explain_fault, explain_no_subscription, faulted, first_fault, met, not_met
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.exercise import NODE_GRAPH, Finding, Problem, ProblemKind
-from grader.grading.model.wording import listed, moment, nearest, number, quote
+from grader.grading.model.wording import first_few, moment, nearest, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import DurationNs, counted, seconds
@@ -126,7 +126,7 @@ class GraphEdges:
         found = [pair for pair in pairs if pair[0].topic == topic]
         # Other nodes before other types: an edge that is there shows that the types agree.
         if found and not any(edge.joins(*pair) for pair in found):
-            return f"no edge {edge}, found {listed(list(dict.fromkeys(_drawn(*pair) for pair in found)))}", ""
+            return f"no edge {edge}, found {first_few(list(dict.fromkeys(_drawn(*pair) for pair in found)))}", ""
         if publishers[0].type != subscriptions[0].type:
             said = f"{topic}: {quote(publishers[0].node)} publishes {quote(publishers[0].type)}, "
             said += f"{quote(subscriptions[0].node)} subscribes {quote(subscriptions[0].type)}"
@@ -255,7 +255,7 @@ class Qos:
         if crashed := explain_fault(trace, f"no publisher on {self.topic}"):
             return crashed
         seen = list(dict.fromkeys(e.topic for e in student_endpoints(trace, "publisher")))
-        ending = f"; seen: {listed(seen)}" if seen else ""
+        ending = f"; seen: {first_few(seen)}" if seen else ""
         return not_met(f"{self.topic}: no publisher{ending}", {"seen": seen[:20]}, problem=ProblemKind.ABSENT)
 
 
@@ -289,7 +289,7 @@ class NodeName:
         # With a node in the graph, its name is wrong, whatever happened to it later.
         if fault is not None and not nodes:
             return faulted(fault, f"no node {wanted}")
-        found = f"{counted(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node"
+        found = f"{counted(len(nodes), 'node')}: {first_few(nodes)}" if nodes else "no node"
         near = nearest(wanted, nodes) or (nodes[0] if len(nodes) == 1 else None)
         hint = f"name the node {wanted.rsplit('/', 1)[-1]!r} instead of {quote(near)}" if near else ""
         kind = ProblemKind.OTHER_NAME if nodes else ProblemKind.ABSENT
@@ -328,7 +328,9 @@ class TopicNames:
         flaws += _flaws("subscribed to", self.subscribes, back, exactly=self.exactly)
         evidence = {"publishes": out, "subscribes": back}
         if not flaws:
-            return met(f"published: {listed(out) or 'nothing'}; subscribed to: {listed(back) or 'nothing'}", evidence)
+            return met(
+                f"published: {first_few(out) or 'nothing'}; subscribed to: {first_few(back) or 'nothing'}", evidence
+            )
         fault = first_fault(trace)
         # With an endpoint in the graph, the program came as far as creating some, so that the others are missing in it.
         if fault is not None and not made:

@@ -18,7 +18,7 @@ from grader.grading.judging.findings import (
 from grader.grading.judging.logs.matching import says
 from grader.grading.judging.logs.outputs import Output, in_window, printed_lines, student_records
 from grader.grading.judging.service_calls import calls_of
-from grader.grading.judging.values import JITTER_NS, heard_from_ns, shown, student_endpoints, value_at
+from grader.grading.judging.values import JITTER_NS, heard_from_ns, shown_value, student_endpoints, value_at
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
 from grader.grading.model.wording import moment, quote, span
 from grader.runtime.model.dataclass import dataclass
@@ -135,16 +135,19 @@ def _judged(trace: Trace, process: str, heard: Sequence[_Heard], within_ns: int,
 
     records = student_records(trace, process)
     missing = unlogged(records)
-    evidence: dict[str, object] = {f"{source.word}s": len(due), "missing": [shown(one.value) for one in missing[:20]]}
+    evidence: dict[str, object] = {
+        f"{source.word}s": len(due),
+        "missing": [shown_value(one.value) for one in missing[:20]],
+    }
     if not missing:
-        return met(f"{process}: {source.all(len(due))} logged, such as {shown(due[0].value)}", evidence)
+        return met(f"{process}: {source.all(len(due))} logged, such as {shown_value(due[0].value)}", evidence)
     # Logged and printed together: a program that logs some and prints the others has written all of them.
     if not unlogged(sorted([*records, *printed_lines(trace, process)], key=lambda o: o.t_ns)):
         return only_printed(f"{process}: {source.all(len(due))} printed, not all of them logged", evidence)
     first = missing[0]
     found = near(records, first)
     wrote = f"found {quote(' / '.join(o.text for o in found), 80)}" if found else "found no log"
-    wanted = f"expected {shown(first.value)} within {span(within_ns)}, {wrote}"
+    wanted = f"expected {shown_value(first.value)} within {span(within_ns)}, {wrote}"
     reason = f"{process}: {len(missing)} of {counted(len(due), source.word)} of {source.name} not logged, the first at "
     reason += f"{moment(first.t_ns)}: {wanted}"
     fault = first_fault(trace, process)

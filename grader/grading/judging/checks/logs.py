@@ -29,7 +29,7 @@ from grader.grading.judging.plots import Drawing, Plot
 from grader.grading.judging.values import JITTER_NS, LONGEST_MATCHED, number_at, published
 from grader.grading.model.chart import Band, Level, Look, Panel, Tone
 from grader.grading.model.exercise import Finding, Location, ProblemKind, Roles
-from grader.grading.model.wording import listed, moment, number, quote
+from grader.grading.model.wording import first_few, moment, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import DurationNs, FieldOf, Pattern, counted, seconds, within
 from grader.runtime.model.trace import LogRecord, Message, Trace
@@ -208,7 +208,7 @@ class LogsMatching:
 
     def _others(self, records: Sequence[LogRecord]) -> str:
         seen = list(dict.fromkeys(f"{r.severity} {quote(r.text, 50)}" for r in records))
-        return f"; logged: {listed(seen, 2)}" if seen else "; nothing was logged"
+        return f"; logged: {first_few(seen, 2)}" if seen else "; nothing was logged"
 
 
 #: Minimum share of the texts of one shape that must show the published number for the shape to count as its log.

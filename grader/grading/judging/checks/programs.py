@@ -29,11 +29,11 @@ from grader.grading.judging.service_calls import (
     reported_parameter,
     settings,
 )
-from grader.grading.judging.source import Source, read, subtree
-from grader.grading.judging.values import FieldRule, Reading, as_number, published, shown, value_at
+from grader.grading.judging.source import Source, read_source, subtree
+from grader.grading.judging.values import FieldRule, Reading, as_number, published, shown_value, value_at
 from grader.grading.model.chart import Look, Panel
 from grader.grading.model.exercise import Finding, Location, ProblemKind, Roles
-from grader.grading.model.wording import listed, moment, number, quote, span
+from grader.grading.model.wording import first_few, moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S, DurationNs, FieldOf, counted, seconds, within
@@ -66,7 +66,7 @@ class ParameterDeclared:
     @property
     def expected(self) -> str:
         kind = f" of type {self.type}" if self.type else ""
-        value = "" if self.value is None else f", by default {shown(self.value)}"
+        value = "" if self.value is None else f", by default {shown_value(self.value)}"
         return f"the parameter {self.name}{kind}{value}"
 
     def judge(self, trace: Trace) -> Finding:
@@ -81,7 +81,7 @@ class ParameterDeclared:
             reason = f"{quote(found.node)}: has no parameter {self.name}, expected {self.expected}"
             return not_met(reason, evidence, hint=_DECLARE_HINT.format(name=self.name), problem=ProblemKind.ABSENT)
         flaw = self._flaw(found)
-        text = f"{quote(found.node)}: the parameter {self.name} is {shown(found.value)} [{found.type}]"
+        text = f"{quote(found.node)}: the parameter {self.name} is {shown_value(found.value)} [{found.type}]"
         if not flaw:
             return met(text, evidence)
         return not_met(f"{text}, expected {flaw}", evidence, problem=ProblemKind.WRONG_VALUE)
@@ -91,7 +91,7 @@ class ParameterDeclared:
             return f"type {self.type}"
         if self.value is None or FieldRule(equals=self.value, tolerance=self.tolerance).allows(found.value):
             return ""
-        return shown(self.value)
+        return shown_value(self.value)
 
 
 def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Finding:
@@ -105,7 +105,7 @@ def _unanswered(trace: Trace, name: str, node: str | None, *, asked: bool) -> Fi
     nodes = list(dict.fromkeys(n for graph in trace.graphs() for n in graph.nodes))
     # A node of another name is the problem of the check on names; here it only prevents the question.
     if node is not None and node not in nodes:
-        reason = f"{node}: not in the ROS graph, so {name} could not be read; found {listed(nodes) or 'no node'}"
+        reason = f"{node}: not in the ROS graph, so {name} could not be read; found {first_few(nodes) or 'no node'}"
         return not_met(reason, {"nodes": nodes[:20]}, blocked_by="node_name", problem=ProblemKind.OTHER_NAME)
     if asked:
         who = node or "the node"
@@ -171,12 +171,12 @@ class ParameterTakesEffect:
             flaw, hint = self._flaw(one, stop_ns, messages)
             if flaw:
                 fault = first_fault(trace)
-                reason = f"{moment(one.t_ns)}, {self.name} = {shown(one.value)}: {flaw}"
+                reason = f"{moment(one.t_ns)}, {self.name} = {shown_value(one.value)}: {flaw}"
                 # A crash while this value applied is why its effect is missing; one after it is not.
                 if fault is not None and fault.t_ns <= stop_ns:
                     return faulted(fault, reason, evidence, last=True)
                 return not_met(reason, evidence, hint=hint)
-        values = ", ".join(shown(s.value) for s in tries)
+        values = ", ".join(shown_value(s.value) for s in tries)
         return met(f"{self.topic}: follows {self.name} ({values}) within {span(self.within)}", evidence)
 
     def drawing(self, trace: Trace) -> Drawing:
@@ -185,7 +185,7 @@ class ParameterTakesEffect:
         stops = [*(s.t_ns for s in tries), trace.stop_ns][1:]
         times = [m.t_ns for m in published(trace, self.topic)]
         cases = tuple(
-            drawn_case(s.t_ns, stop_ns, f"{self.name} = {shown(s.value)}{'' if s.taken else ', refused'}")
+            drawn_case(s.t_ns, stop_ns, f"{self.name} = {shown_value(s.value)}{'' if s.taken else ', refused'}")
             for s, stop_ns in zip(tries, stops, strict=True)
         )
         known = [(s, as_number(s.value)) for s in tries]
@@ -231,7 +231,7 @@ class ParameterTakesEffect:
         """Return the rate that a value asks for, in hertz."""
         wanted = as_number(one.value)
         if wanted is None or not wanted > 0:
-            raise HarnessError(f"{self.name}: {shown(one.value)} is neither a rate nor a period")
+            raise HarnessError(f"{self.name}: {shown_value(one.value)} is neither a rate nor a period")
         return wanted if self.effect == "rate" else 1 / wanted
 
     def _field_flaw(self, one: ParameterSetting, after: Sequence[Message]) -> str:
@@ -246,7 +246,9 @@ class ParameterTakesEffect:
         wrong = next((m for m in after if not rule.allows(_held(m, self.field))), None)
         if wrong is None:
             return ""
-        return f"{self.field} is {shown(_held(wrong, self.field))} at {moment(wrong.t_ns)}, expected {rule.wanted}"
+        return (
+            f"{self.field} is {shown_value(_held(wrong, self.field))} at {moment(wrong.t_ns)}, expected {rule.wanted}"
+        )
 
     def _pace_flaw(self, one: ParameterSetting, after: Sequence[Message], stop_ns: int) -> str:
         rate = self._rate(one)
@@ -461,8 +463,10 @@ def _source(trace: Trace, sources: Mapping[str, str], process: str) -> Source | 
         HarnessError: The file is missing, or too long to be read.
     """
     if process not in sources:
-        raise HarnessError(f"{process}: its source was not kept; there are {listed(sorted(sources)) or 'no sources'}")
-    source = read(process, sources[process])
+        raise HarnessError(
+            f"{process}: its source was not kept; there are {first_few(sorted(sources)) or 'no sources'}"
+        )
+    source = read_source(process, sources[process])
     if source.tree is not None:
         return source
     fault = first_fault(trace, process)

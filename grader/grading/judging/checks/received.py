@@ -23,7 +23,7 @@ from grader.grading.judging.findings import (
     request_said,
 )
 from grader.grading.judging.logs.conversions import LoggedNumbers, times, wrong_conversion
-from grader.grading.judging.logs.matching import Sought, followed, shows_about, standing, surroundings
+from grader.grading.judging.logs.matching import Sought, followed, other_numbers, shows_about, standing
 from grader.grading.judging.logs.outputs import Output, after, in_window, numbers_in, printed_lines, student_records
 from grader.grading.judging.plots import Drawing, Plot
 from grader.grading.judging.texts import Printed, clean
@@ -128,7 +128,7 @@ class LogsValues:
         records: Sequence[Output],
     ) -> str:
         """Return a clause about the numbers among which something is lost."""
-        return surroundings(records, self._sought([one], [one.stop_ns])[0])
+        return other_numbers(records, self._sought([one], [one.stop_ns])[0])
 
     def when_missing(
         self, trace: Trace, received: Sequence[_Received], absent: Sequence[_Received], evidence: dict[str, object]
@@ -402,7 +402,7 @@ class LogsReceived:
 
     def among(self, trace: Trace, values: Sequence[Held], one: Held, records: Sequence[Output]) -> str:
         """Return a clause about the numbers among which something is lost."""
-        return surroundings(records, self._sought(values, trace)[values.index(one)])
+        return other_numbers(records, self._sought(values, trace)[values.index(one)])
 
     def evidence_of(self, values: Sequence[Held], unlogged: Sequence[Held]) -> dict[str, object]:
         """Return the numbers behind the finding."""

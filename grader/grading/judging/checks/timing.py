@@ -44,7 +44,7 @@ from grader.grading.judging.values import (
 )
 from grader.grading.model.chart import Band, Level, Stretch, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
-from grader.grading.model.wording import listed, moment, number, quote, span
+from grader.grading.model.wording import first_few, moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S, DurationNs, FieldFormula, FieldOf, counted, seconds, within
@@ -491,7 +491,7 @@ class Reaction:
         self, trace: Trace, wrong: Sequence[tuple[_Asked, str]], total: int, evidence: dict[str, object]
     ) -> Finding:
         asked, flaw = wrong[0]
-        shown = listed([f"{path} = {_short(asked.given.value, path)}" for path in asked.case.when])
+        shown = first_few([f"{path} = {_short(asked.given.value, path)}" for path in asked.case.when])
         reason = f"{self.output}, after {shown} on {self.input} at {moment(asked.given.t_ns)}: {flaw}; "
         reason += f"wrong after {len(wrong)} of {counted(total, 'input')}"
         fault = first_fault(trace)

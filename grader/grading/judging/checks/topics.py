@@ -17,10 +17,18 @@ from grader.grading.judging.findings import (
     request_said,
 )
 from grader.grading.judging.plots import Drawing, Plot, value_panels
-from grader.grading.judging.values import FieldRule, equals, leaves, number_at, published, student_endpoints, text_at
+from grader.grading.judging.values import (
+    FieldRule,
+    equals,
+    number_at,
+    numbers_by_path,
+    published,
+    student_endpoints,
+    text_at,
+)
 from grader.grading.model.chart import Level
 from grader.grading.model.exercise import NODE_GRAPH, Finding, ProblemKind, Roles
-from grader.grading.model.wording import listed, moment, number, numbers, quote
+from grader.grading.model.wording import first_few, moment, number, numbers, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import SLACK, FieldNumber, FieldOf, Hertz, counted, seconds, within
 from grader.runtime.model.trace import Message, Trace, unusual_request
@@ -135,7 +143,7 @@ class FieldValues(EqualFields):
         return f"leave {stray} at 0.0" if stray and len(got) == 1 else ""
 
     def _misplaced(self, message: Message, path: str, want: float) -> str:
-        for other, value in leaves(message.value).items():
+        for other, value in numbers_by_path(message.value).items():
             free = other not in self.values or not equals(value, self.values[other], self.tolerance)
             if other != path and free and equals(value, want, self.tolerance):
                 return f"{number(want)} is in {quote(other)}; it belongs in {path}"
@@ -276,7 +284,7 @@ class Transform:
                 return not_met(reason, hint=f"publish it on {self._topics[0]}", problem=ProblemKind.OTHER_NAME)
             return explain_no_message(trace, self._topics[0])
         pairs = list(dict.fromkeys(f"{quote(p, 30)} → {quote(c, 30)}" for p, c in (f.frames for f in found)))
-        reason = f"no transform {self.parent} → {self.child}; found {listed(pairs)}"
+        reason = f"no transform {self.parent} → {self.child}; found {first_few(pairs)}"
         swapped = any(f.frames == (self.child.lstrip("/"), self.parent.lstrip("/")) for f in found)
         hint = f"header.frame_id is the parent, {self.parent}, and child_frame_id is {self.child}" if swapped else ""
         return not_met(reason, {"found": pairs[:20]}, hint=hint, problem=ProblemKind.OTHER_NAME)

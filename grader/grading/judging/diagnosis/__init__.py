@@ -24,14 +24,14 @@ from grader.grading.judging.diagnosis import (
     simulated,
     values,
 )
-from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, in_order, unfit
+from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, clue_flaw, rules_in_order
 from grader.grading.judging.diagnosis.wiring import bare_statements
 from grader.grading.judging.findings import FAULT_KEY, fault_evidence, fault_hint, fault_sentence
-from grader.grading.judging.source import Source, argument, chain, first_line, last_name, read, text_of
+from grader.grading.judging.source import Source, argument, chain, first_line, last_name, literal_text, read_source
 from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome
 from grader.grading.model.report import Verdict
 from grader.grading.model.wording import quote
-from grader.runtime.model.author_files import AuthorMistake, line_of, words_of
+from grader.runtime.model.author_files import AuthorMistake, error_words, line_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import Fault, Trace, main_not_called, same_node_name
@@ -54,7 +54,7 @@ _MODULES = (
     logs,
 )
 #: All rules of the grader in the order of their priorities; the first that applies wins.
-RULES: tuple[Rule, ...] = in_order(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
+RULES: tuple[Rule, ...] = rules_in_order(item for m in _MODULES for item in vars(m).values() if isinstance(item, Rule))
 _LOST = (Outcome.NOT_MET, Outcome.PARTLY)
 _LOG = logging.getLogger(__name__)
 #: Evidence key for the id of the cause.
@@ -82,7 +82,7 @@ def cases_of(  # noqa: PLR0913  what was found, and everything that may explain 
     asked = {c.scenario for v, c in zip(verdicts, exercise.criteria, strict=True) if v.outcome in _LOST}
     # only these, because parsing a file takes longer than judging it
     names = dict.fromkeys(p for s in exercise.scenarios if s.id in asked for p in s.processes if p in sources)
-    read_ = {name: read(submission.files[name].found or name, sources[name]) for name in names}
+    read_ = {name: read_source(submission.files[name].found or name, sources[name]) for name in names}
     lost: dict[str, Criterion] = {}
     cases: list[Case | None] = []
     for verdict, criterion in zip(verdicts, exercise.criteria, strict=True):
@@ -137,7 +137,7 @@ def _explained(verdict: Verdict, found: tuple[str, Clue] | None, owner: dict[str
 def rules_of(exercise: Exercise) -> tuple[Rule, ...]:
     """Return the rules that are asked about an exercise in their order; of equal ones, its own come first."""
     own = [rule for rule in exercise.hints if isinstance(rule, Rule)]
-    return in_order((*own, *RULES)) if own else RULES
+    return rules_in_order((*own, *RULES)) if own else RULES
 
 
 def clue_for(
@@ -158,7 +158,7 @@ def clues_for(
     for rule in rules:
         try:
             clue = rule.clue(case)
-            if rule.file and clue is not None and (wrong := unfit(clue, case)):
+            if rule.file and clue is not None and (wrong := clue_flaw(clue, case)):
                 raise TypeError(wrong)
         except Exception as error:
             if not rule.file:
@@ -171,7 +171,7 @@ def clues_for(
 
 
 def _mistake(rule: Rule, error: Exception) -> AuthorMistake:
-    text = f"the rule {rule.id}: {type(error).__name__}: {quote(words_of(error))}"
+    text = f"the rule {rule.id}: {type(error).__name__}: {quote(error_words(error))}"
     return AuthorMistake(rule.file.rsplit("/", 1)[-1], line_of(error, rule.file, 0), text)
 
 
@@ -189,7 +189,7 @@ def hint_for(fault: Fault, trace: Trace, text: str) -> str:
     evidence = {FAULT_KEY: fault_evidence(fault)}
     verdict = Verdict("fault", "", Outcome.NOT_MET, Fraction(0), Fraction(1), reason, evidence=evidence)
     criterion = Criterion("fault", "", Fraction(1), trace.scenario, _Fault())
-    sources = {fault.process: read(fault.file or fault.process, text)} if text else {}
+    sources = {fault.process: read_source(fault.file or fault.process, text)} if text else {}
     found = clue_for(Case(criterion, verdict, trace, sources, fault))
     if found is None:
         return fault_hint(fault)
@@ -236,16 +236,16 @@ def _with_names(note: str, files: Mapping[str, str]) -> str:
     """Return a note that two nodes have one name with the places that give it."""
     places: list[str] = []
     for file, text in files.items():
-        source = read(file, text)
+        source = read_source(file, text)
         for call in (*source.calls("__init__"), *source.calls("create_node"), *source.calls("Node")):
-            name = text_of(argument(call, 0, "node_name"))
+            name = literal_text(argument(call, 0, "node_name"))
             if name is not None and note == same_node_name(f"/{name.strip('/')}"):
                 places.append(f"{file}:{first_line(call)}")
     return f"{' and '.join(places)}: {note}" if places else note
 
 
 def _placed(file: str, text: str) -> str:
-    source = read(file, text)
+    source = read_source(file, text)
     guard = _wrong_guard(source)
     if guard is not None:
         problem = f"{file}:{first_line(guard)}: 'if {source.code(guard.test, 60)}' is never true, so "
@@ -265,7 +265,7 @@ def _wrong_guard(source: Source) -> ast.If | None:
         if source.function_of(node) is not None or not isinstance(test, ast.Compare):
             continue
         sides = [test.left, *test.comparators]
-        texts = [t for s in sides if (t := text_of(s)) is not None]
+        texts = [t for s in sides if (t := literal_text(s)) is not None]
         named = any(last_name(s) == "__name__" for s in sides)
         if (named and texts != ["__main__"]) or (not named and any("main" in t for t in texts)):
             return node

@@ -18,8 +18,8 @@ from grader.grading.judging.source import (
     first_line,
     last_line,
     last_name,
+    literal_text,
     parameters,
-    text_of,
 )
 from grader.grading.model.exercise import Location
 from grader.runtime.model.trace import Fault, FaultKind
@@ -327,7 +327,7 @@ def _super_of_other(crash: Crash) -> Clue | None:
     """`super(Node).__init__(...)` and `Node.__init__('name')`."""
     for call in crash.source.on_line(crash.line, ast.Call):
         base = call.func.value if isinstance(call.func, ast.Attribute) and call.func.attr == "__init__" else None
-        named = isinstance(base, ast.Name) and bool(call.args) and text_of(call.args[0]) is not None
+        named = isinstance(base, ast.Name) and bool(call.args) and literal_text(call.args[0]) is not None
         other = isinstance(base, ast.Call) and chain(base.func) == "super" and bool(base.args)
         if named or other:
             given = ", ".join(crash.source.code(a, 40) for a in call.args if chain(a) != "self")
@@ -504,7 +504,12 @@ def _topic_arguments(crash: Crash, item: Made) -> Clue | None:  # noqa: PLR0911 
 def _parameter_arguments(crash: Crash) -> Clue | None:
     """The arguments of declare_parameter are swapped."""
     call = _call_at_fault(crash, "declare_parameter")
-    if call is None or len(call.args) < 2 or text_of(call.args[0]) is not None or text_of(call.args[1]) is None:
+    if (
+        call is None
+        or len(call.args) < 2
+        or literal_text(call.args[0]) is not None
+        or literal_text(call.args[1]) is None
+    ):
         return None
     name, value = crash.source.code(call.args[1]), crash.source.code(call.args[0])
     return Clue(f"the name comes first, then the value: declare_parameter({name}, {value})")

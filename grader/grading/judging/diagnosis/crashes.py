@@ -19,7 +19,17 @@ from grader.grading.judging.diagnosis.wiring import (
     spins,
     variable_of,
 )
-from grader.grading.judging.source import Loop, Source, argument, chain, covers, first_line, last_name, subtree, text_of
+from grader.grading.judging.source import (
+    Loop,
+    Source,
+    argument,
+    chain,
+    covers,
+    first_line,
+    last_name,
+    literal_text,
+    subtree,
+)
 from grader.grading.model.wording import named
 from grader.runtime.model.trace import FaultKind
 
@@ -46,7 +56,7 @@ def _wrong_field_type(crash: Crash) -> Clue | None:
             if item is not None:
                 hint = "String holds text, but the task asks for numbers: use a numeric type such as Float32"
                 return Clue(hint, crash.source.place(item.call))
-        literal = text_of(value) or ""
+        literal = literal_text(value) or ""
         if type_ == "bool" and literal.capitalize() in ("True", "False"):
             return Clue(f"{written} is a string: write {target}{literal.capitalize()}, without quotes")
         return Clue(f"the field {field} takes {other}: write {target}{type_}({written})") if other else None
@@ -63,11 +73,11 @@ def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
     if isinstance(value, ast.Tuple) and len(value.elts) == 2 and all(map(_is_whole, value.elts)):
         number = ".".join(source.code(e) for e in value.elts)
         return Clue(f"a decimal comma makes two numbers: write {target}{number}", key="comma")
-    number = (text_of(value) or "").strip().replace(",", ".")
+    number = (literal_text(value) or "").strip().replace(",", ".")
     if number.lstrip("+-").replace(".", "", 1).isdigit():
         number = number if "." in number else f"{number}.0"
         return Clue(f"{written} is a string, but the field takes a number: write {target}{number}", key="quoted_number")
-    if text_of(value) is not None:
+    if literal_text(value) is not None:
         return Clue(f"{written} is a string, but the field takes a number: write {target}0.0, with your number")
     if isinstance(value, ast.Call) and chain(value.func) == "str" and len(value.args) == 1:
         return Clue(f"str() makes a string, the field takes a float: write {target}{source.code(value.args[0], 50)}")
@@ -104,9 +114,9 @@ def _declared_without_value(source: Source, value: ast.expr) -> Clue | None:
     call = value.value if isinstance(value, ast.Attribute) and value.attr == "value" else None
     if not isinstance(call, ast.Call) or last_name(call.func) != "get_parameter" or not call.args:
         return None
-    name = text_of(call.args[0])
+    name = literal_text(call.args[0])
     for declared in source.calls("declare_parameter"):
-        if len(declared.args) == 1 and not declared.keywords and text_of(declared.args[0]) == name:
+        if len(declared.args) == 1 and not declared.keywords and literal_text(declared.args[0]) == name:
             hint = f"the parameter has no value: write {source.code(declared).removesuffix(')')}, 0.5)"
             return Clue(hint, source.place(declared))
     return None
@@ -199,7 +209,7 @@ def _declared_twice(crash: Crash) -> Clue | None:
 def _parameter_without_value(crash: Crash) -> Clue | None:
     """A parameter is declared with a type and without a value, and nobody sets it."""
     name = crash.found[1]
-    declared = [c for c in crash.case.source.calls("declare_parameter") if c.args and text_of(c.args[0]) == name]
+    declared = [c for c in crash.case.source.calls("declare_parameter") if c.args and literal_text(c.args[0]) == name]
     hint = f"the parameter {name[:60]} has no value: give it a default, declare_parameter('{name[:60]}', value)"
     return Clue(hint, crash.case.source.place(declared[0]) if len(declared) == 1 else None)
 
@@ -231,9 +241,9 @@ def _sets_undeclared(crash: Crash) -> Clue | None:
     """`set_parameters` with a parameter that is not declared, which its exception does not name."""
     function = crash.source.function_at(crash.line)
     within = [c for c in crash.source.calls("Parameter") if function is None or covers(function, c.lineno)]
-    names = [name for call in within if (name := text_of(argument(call, 0, "name")))]
+    names = [name for call in within if (name := literal_text(argument(call, 0, "name")))]
     calls = [*crash.source.calls("declare_parameter")]
-    declared = {name for call in calls if (name := text_of(argument(call, 0, "name")))}
+    declared = {name for call in calls if (name := literal_text(argument(call, 0, "name")))}
     missing = next((name for name in names if name not in declared), "")
     if not missing:
         return None

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule
 from grader.grading.judging.diagnosis.wiring import (
     callback_nodes,
-    constant,
+    constant_value,
     given_leaf,
     is_read,
     made,
@@ -389,7 +389,7 @@ def _formula_nearly(case: Case) -> Clue | None:
         better = _exchanged_in(value, old, new)
         if not _same(source, better, counter, wanted, step):
             continue
-        worth = constant(source, old)
+        worth = constant_value(source, old)
         if isinstance(old, (ast.Name, ast.Attribute)) and worth is not None and isinstance(new, ast.Constant):
             hint = f"{source.code(old)} is {number(worth.value)}, and {formula} needs {number(float(str(new.value)))}"
             return Clue(hint, source.place(worth.origin))

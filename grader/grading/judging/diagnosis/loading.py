@@ -16,7 +16,7 @@ from grader.grading.judging.diagnosis.names import (
     import_of,
 )
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
-from grader.grading.judging.source import Source, argument, chain, covers, last_name, text_of
+from grader.grading.judging.source import Source, argument, chain, covers, last_name, literal_text
 from grader.grading.model.exercise import Location
 from grader.grading.model.wording import named, quote
 from grader.runtime.model.submission import EXPORT_NOTEBOOK
@@ -311,7 +311,7 @@ def _writes(call: ast.Call) -> bool:
     if last_name(call.func) != "open":
         return last_name(call.func) in ("write_text", "write_bytes")
     place = 1 if isinstance(call.func, ast.Name) else 0
-    mode = text_of(argument(call, place, "mode")) or ""
+    mode = literal_text(argument(call, place, "mode")) or ""
     return bool(set(mode) & set("wax")) and set(mode) <= set("waxbt+")
 
 

@@ -11,7 +11,7 @@ from grader.grading.judging.diagnosis.wiring import (
     Made,
     callback_nodes,
     conditions,
-    constant,
+    constant_value,
     is_flag,
     is_log,
     is_read,
@@ -35,7 +35,7 @@ from grader.grading.judging.diagnosis.wiring import (
 )
 from grader.grading.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
 from grader.grading.judging.logs.outputs import printed_lines, student_records
-from grader.grading.judging.source import Source, argument, chain, last_name, subtree, text_of
+from grader.grading.judging.source import Source, argument, chain, last_name, literal_text, subtree
 from grader.grading.model.exercise import Location, Outcome, ProblemKind
 from grader.grading.model.wording import number
 
@@ -87,7 +87,7 @@ def _writes(call: ast.Call) -> bool:
     if name == "basicConfig":
         return any(k.arg == "filename" for k in call.keywords)
     plain = chain(call.func) in _OPENS
-    mode = text_of(argument(call, 1 if plain else 0, "mode")) if name == "open" else None
+    mode = literal_text(argument(call, 1 if plain else 0, "mode")) if name == "open" else None
     return bool(mode) and mode is not None and bool(set(mode) & set("wax"))
 
 
@@ -114,7 +114,7 @@ def _most_printed(case: Case, prints: list[ast.Call]) -> list[ast.Call]:
     lines = [o.text for o in printed_lines(case.trace, case.process)][:400]
 
     def seen(call: ast.Call) -> int:
-        words = [w for n in ast.walk(call) if (w := text_of(n)) and len(w.strip()) > 2]
+        words = [w for n in ast.walk(call) if (w := literal_text(n)) and len(w.strip()) > 2]
         return max((sum(w.strip() in line for line in lines) for w in words), default=0)
 
     return sorted(prints, key=seen, reverse=True) if case.logs else prints
@@ -156,7 +156,7 @@ def _text_as_it_stands(case: Case) -> Clue | None:
     """The f of an f-string is missing, or the values behind a `%` or in `format`."""
     source = case.source
     logs = [n for n in source.all(ast.Call) if is_log(source, n) or chain(n.func) == "print"]
-    plain = [(call, t) for call in logs if len(call.args) == 1 and (t := text_of(call.args[0])) is not None]
+    plain = [(call, t) for call in logs if len(call.args) == 1 and (t := literal_text(call.args[0])) is not None]
     written = {o.text.strip() for o in student_records(case.trace, case.process)}
     written |= {o.text.strip() for o in printed_lines(case.trace, case.process)}
     doubled = [
@@ -400,7 +400,7 @@ def _log_period(case: Case) -> Clue | None:
     if call is None or pace is None or pace.count == 0:
         return None
     source, wanted_s, average = case.source, pace.wanted_s, pace.average_s
-    worth = constant(source, argument(call, 99, "throttle_duration_sec"))
+    worth = constant_value(source, argument(call, 99, "throttle_duration_sec"))
     rare = pace.count <= 2 and worth is not None and worth.value > 2 * wanted_s
     if worth is not None and (rare or 0.8 * worth.value <= average <= 1.3 * worth.value):
         hint = f"throttle_duration_sec={number(worth.value)} allows a log every {number(worth.value)} s"
@@ -438,7 +438,7 @@ def _counts(source: Source, test: ast.expr) -> bool:
 
 
 def _timer_pace(source: Source, timers: list[Made], average_s: float, wanted_s: float) -> Clue | None:
-    worth = constant(source, timers[0].period)
+    worth = constant_value(source, timers[0].period)
     if worth is not None and worth.value == 0:
         return rounded_down(source, timers[0], wanted_s)
     if worth is None or abs(worth.value - average_s) > 0.05 * average_s or worth.value == wanted_s:
@@ -660,7 +660,7 @@ def _log_every(case: Case) -> Clue | None:
         return None
     divisions = [n for n in ast.walk(test.test) if isinstance(n, ast.BinOp)]
     by = [n for n in divisions if isinstance(n.op, ast.Mod)]
-    worth = constant(source, by[0].right) if len(by) == 1 else None
+    worth = constant_value(source, by[0].right) if len(by) == 1 else None
     if worth is None:
         return _logged_by_quotient(source, test, divisions, every) or _logged_at_one_number(source, test, every)
     rest = number_in_code(source, test.test.comparators[0]) if isinstance(test.test, ast.Compare) else None

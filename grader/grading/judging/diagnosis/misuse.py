@@ -17,7 +17,7 @@ from grader.grading.judging.diagnosis.names import (
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule
 from grader.grading.judging.diagnosis.wiring import (
     ORDERS,
-    constant,
+    constant_value,
     made,
     message_classes,
     node_made,
@@ -35,9 +35,9 @@ from grader.grading.judging.source import (
     chain,
     first_line,
     last_name,
+    literal_text,
     parameters,
     quoted_number,
-    text_of,
 )
 
 #: Fields of messages that may hold a number.
@@ -217,7 +217,7 @@ def _module_called(name: str) -> Clue | None:
 def _quoted_callback(crash: Crash) -> Clue | None:
     source = crash.source
     for item in made(source, "timer", "subscription"):
-        name = text_of(item.callback)
+        name = literal_text(item.callback)
         if name is not None and item.callback is not None and len(name) < 60:
             hint = f"pass the method itself, without quotes: self.{name.strip('.')}"
             return Clue(hint, source.place(item.callback))
@@ -303,7 +303,7 @@ def _node_name(crash: Crash) -> Clue | None:
     """The name of the node is not a string."""
     for call in _calls(crash, "__init__"):
         first = argument(call, 0, "node_name")
-        if first is not None and chain(call.func) == "super().__init__" and text_of(first) is None:
+        if first is not None and chain(call.func) == "super().__init__" and literal_text(first) is None:
             name = crash.fault.process.removesuffix(".py")
             return Clue(f"the node name is a string: super().__init__('{name}')")
     return None
@@ -460,10 +460,10 @@ def _text_and_number(crash: Crash) -> Clue | None:
     if not sums:
         return None
     parts = list(_summands(sums[0]))
-    texts = [text_of(p) for p in parts]
+    texts = [literal_text(p) for p in parts]
     if not any(t is not None for t in texts):
         return None
-    numbers = [quoted_number(p) for p in parts if text_of(p) is not None]
+    numbers = [quoted_number(p) for p in parts if literal_text(p) is not None]
     if all(numbers):
         number = numbers[0]
         return Clue(f"'{number}' is a string: write {number} without quotes to calculate with it")
@@ -598,7 +598,7 @@ def _percent(crash: Crash) -> Clue | None:
     """`'%.2f, %.2f' % x, y`: placeholders and values do not fit."""
     source = crash.source
     for node in source.on_line(crash.line, ast.BinOp):
-        written = text_of(node.left)
+        written = literal_text(node.left)
         if not isinstance(node.op, ast.Mod) or written is None:
             continue
         places = len(_PLACEHOLDER.findall(written))
@@ -625,7 +625,7 @@ def _percent(crash: Crash) -> Clue | None:
 def _format_fields(crash: Crash) -> Clue | None:
     """`'{} {}'.format(x)`: braces and values do not fit."""
     for call in _calls(crash, "format"):
-        written = text_of(call.func.value) if isinstance(call.func, ast.Attribute) else None
+        written = literal_text(call.func.value) if isinstance(call.func, ast.Attribute) else None
         if written is None:
             continue
         places = len(re.findall(r"(?<!\{)\{(?!\{)", written))
@@ -652,7 +652,9 @@ def _format_code(crash: Crash) -> Clue | None:
         return Clue(f"{value} is a string here: convert it with float(...), or remove the format")
     if type_ == "float":
         specs = [
-            (n, text_of(s.values[0])) for n in formatted if isinstance(s := n.format_spec, ast.JoinedStr) and s.values
+            (n, literal_text(s.values[0]))
+            for n in formatted
+            if isinstance(s := n.format_spec, ast.JoinedStr) and s.values
         ]
         own = next((n for n, spec in specs if spec is not None and spec.endswith(code)), None)
         shown = f"{{{source.code(own.value, 30)}:.2f}}" if own is not None else ":.2f"
@@ -676,7 +678,7 @@ def _divided_by_zero(crash: Crash) -> Clue | None:
     if len(divisions) != 1:
         return None
     divisor, code = divisions[0].right, source.code(divisions[0].right, 40)
-    worth = constant(source, divisor)
+    worth = constant_value(source, divisor)
     if worth is not None and worth.value == 0 and worth.origin is not divisor:
         return Clue(f"{code} is 0, and division by 0 fails: give it another value", source.place(worth.origin))
     if worth is not None and worth.value == 0:

@@ -23,7 +23,7 @@ from grader.grading.judging.diagnosis.wiring import (
     called_only,
     changes,
     conditions,
-    constant,
+    constant_value,
     head_of,
     made,
     made_for,
@@ -101,7 +101,7 @@ def _period(paced: _Paced) -> Clue | None:
     timers = paced.timers()
     if len(timers) != 1:
         return None
-    worth = constant(paced.source, timers[0].period)
+    worth = constant_value(paced.source, timers[0].period)
     if worth is None or same_pace(worth.value, paced.period_s):
         return None
     if worth.value == 0:
@@ -186,7 +186,7 @@ def _sleeps(source: Source, nodes: Iterable[ast.AST]) -> list[Constant]:
     found = []
     for node in nodes:
         if isinstance(node, ast.Call) and chain(node.func) in ("time.sleep", "sleep"):
-            worth = constant(source, argument(node, 0, "secs"))
+            worth = constant_value(source, argument(node, 0, "secs"))
             if worth is not None and worth.value > 0:
                 found.append(Constant(worth.value, node))
     return sorted(found, key=lambda s: first_line(s.origin))
@@ -196,7 +196,7 @@ def _pause(source: Source, loop: ast.AST) -> list[Constant]:
     """Return the sleeps in a loop, and the timeouts of spin_once, each with the call as origin."""
     inside = list(reached(source, [loop]))
     spun = [n for n in inside if isinstance(n, ast.Call) and last_name(n.func) == "spin_once"]
-    waits = [(c, constant(source, spin_timeout(c))) for c in spun]
+    waits = [(c, constant_value(source, spin_timeout(c))) for c in spun]
     timeouts = [Constant(worth.value, call) for call, worth in waits if worth is not None and worth.value > 0]
     return sorted([*_sleeps(source, inside), *timeouts], key=lambda s: first_line(s.origin))
 
@@ -255,7 +255,7 @@ def _held_up_beside_spinning(paced: _Paced) -> Clue | None:
 def _too_slow(paced: _Paced) -> Clue | None:
     """The period is right, but the rate is too low."""
     timers = paced.timers()
-    worth = constant(paced.source, timers[0].period) if len(timers) == 1 else None
+    worth = constant_value(paced.source, timers[0].period) if len(timers) == 1 else None
     if worth is None or not same_pace(worth.value, paced.period_s):
         return None
     if math.isnan(paced.found_hz) or paced.found_hz > 0.97 * paced.wanted_hz:
@@ -290,7 +290,7 @@ def _loop_pace(paced: _Paced) -> Clue | None:
         return None
     source, wanted = paced.source, number(paced.wanted_hz)
     rates = list(source.calls("create_rate", "Rate"))
-    worth = constant(source, argument(rates[0], 0, "frequency")) if len(rates) == 1 else None
+    worth = constant_value(source, argument(rates[0], 0, "frequency")) if len(rates) == 1 else None
     if worth is not None and worth.value > 0 and _explains(paced, 1 / worth.value):
         hint = f"{source.code(rates[0])} is {number(worth.value)} Hz"
         if same_pace(worth.value, paced.period_s):

@@ -15,7 +15,7 @@ from grader.grading.judging.diagnosis.wiring import Made, is_log, made_for, numb
 from grader.grading.judging.logs.outputs import student_records
 from grader.grading.judging.source import Source, chain, first_line
 from grader.grading.judging.values import published, student_endpoints
-from grader.grading.model.exercise import Check, Criterion, Location, Outcome, ProblemKind, named, roles_of
+from grader.grading.model.exercise import Check, Criterion, Location, Outcome, ProblemKind, roles_of, texts_under
 from grader.grading.model.report import Verdict
 from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
@@ -81,7 +81,7 @@ class Case:
         """The one file that the criterion is about; empty if there are several."""
         if self.fault is not None:
             return self.fault.process
-        own = named(self.check, roles_of(type(self.check)).process)
+        own = texts_under(self.check, roles_of(type(self.check)).process)
         return own[0] if own else (next(iter(self.sources)) if len(self.sources) == 1 else "")
 
     @property
@@ -114,32 +114,32 @@ class Case:
     @property
     def hears(self) -> tuple[str, ...]:
         """The topics to which a node has to subscribe, as far as the check declares them."""
-        return named(self.check, *roles_of(type(self.check)).hears)
+        return texts_under(self.check, *roles_of(type(self.check)).hears)
 
     @property
     def speaks(self) -> tuple[str, ...]:
         """The topics on which the check misses messages, as far as it declares them."""
-        return named(self.check, *roles_of(type(self.check)).speaks)
+        return texts_under(self.check, *roles_of(type(self.check)).speaks)
 
     @property
     def logs(self) -> tuple[str, ...]:
         """The topics of which the process has to log what arrives, as far as the check declares them."""
-        return named(self.check, *roles_of(type(self.check)).logs)
+        return texts_under(self.check, *roles_of(type(self.check)).logs)
 
     @property
     def serves(self) -> tuple[str, ...]:
         """The services that a node has to offer, as far as the check declares them."""
-        return named(self.check, *roles_of(type(self.check)).serves)
+        return texts_under(self.check, *roles_of(type(self.check)).serves)
 
     @property
     def calls(self) -> tuple[str, ...]:
         """The services that a node has to call, as far as the check declares them."""
-        return named(self.check, *roles_of(type(self.check)).calls)
+        return texts_under(self.check, *roles_of(type(self.check)).calls)
 
     @property
     def type(self) -> str:
         """The message type that the check asks for; empty if there is none."""
-        return "".join(named(self.check, roles_of(type(self.check)).type))
+        return "".join(texts_under(self.check, roles_of(type(self.check)).type))
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +221,7 @@ def is_asked(rule: Rule, case: Case) -> bool:
     )
 
 
+#: A decorator that makes a hint rule of a function.
 Maker = Callable[[Callable[[Given], Clue | None]], Rule]
 
 
@@ -290,7 +291,7 @@ def _crash(text: str, kinds: tuple[FaultKind, ...], in_file: bool, case: Case) -
     return None if found is None or (in_file and source is NO_SOURCE) else Crash(case, fault, source, found)
 
 
-def unfit(clue: object, case: Case) -> str:
+def clue_flaw(clue: object, case: Case) -> str:
     """Describe what is wrong with what an author's rule returned for a case; empty if it can be reported."""
     if not isinstance(clue, Clue):
         return f"expected a Clue or None, found a {type(clue).__name__}"
@@ -351,7 +352,7 @@ def lines_of(node: ast.AST, *others: ast.AST) -> str:
     return f"lines {', '.join(map(str, numbers[:-1]))} and {numbers[-1]}"
 
 
-def in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
+def rules_in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
     """Return rules in the order in which they are asked; of equal priorities, the first stays first."""
     return tuple(sorted(rules, key=lambda rule: rule.priority))
 

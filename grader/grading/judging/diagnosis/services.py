@@ -28,10 +28,10 @@ from grader.grading.judging.source import (
     covers,
     first_line,
     last_name,
+    literal_text,
     parameters,
-    text_of,
 )
-from grader.grading.model.exercise import ProblemKind, named, roles_of
+from grader.grading.model.exercise import ProblemKind, roles_of, texts_under
 from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 
@@ -109,7 +109,7 @@ def _type_of(end: _End) -> str:
     """Return the type that a criterion of the exercise asks for; empty if none does."""
     for check in (end.case.check, *end.case.siblings):
         roles = roles_of(type(check))
-        if end.service in named(check, *roles.services) and (types := named(check, roles.type)):
+        if end.service in texts_under(check, *roles.services) and (types := texts_under(check, roles.type)):
             return types[0]
     return ""
 
@@ -328,10 +328,15 @@ def _service_arguments(crash: Crash) -> Clue | None:
         if call is None:
             continue
         codes = [source.code(a, 40) for a in call.args]
-        if text_of(call.args[0]) is not None and text_of(call.args[1]) is None:
+        if literal_text(call.args[0]) is not None and literal_text(call.args[1]) is None:
             given = ", ".join([codes[1], codes[0], *codes[2:]])
             return Clue(f"the service type comes first, then the name: create_{kind}({given})")
-        if kind == "service" and len(codes) > 2 and text_of(call.args[1]) is None and text_of(call.args[2]) is not None:
+        if (
+            kind == "service"
+            and len(codes) > 2
+            and literal_text(call.args[1]) is None
+            and literal_text(call.args[2]) is not None
+        ):
             given = ", ".join([codes[0], codes[2], codes[1]])
             return Clue(f"the name comes second, then the callback: create_service({given})")
     return None

@@ -20,7 +20,7 @@ from grader.grading.judging.diagnosis.wiring import (
     MOST_MADE,
     Made,
     conditions,
-    constant,
+    constant_value,
     elsewhere_because,
     head_of,
     is_flag,
@@ -58,11 +58,11 @@ from grader.grading.judging.source import (
     covers,
     first_line,
     last_name,
+    literal_text,
     subtree,
-    text_of,
 )
 from grader.grading.judging.values import carries_number, student_endpoints
-from grader.grading.model.exercise import Location, Outcome, ProblemKind, named, roles_of
+from grader.grading.model.exercise import Location, Outcome, ProblemKind, roles_of, texts_under
 from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds
@@ -135,7 +135,7 @@ def _sets_domain(node: ast.Assign | ast.keyword) -> bool:
     if isinstance(node, ast.keyword):
         return node.arg == "domain_id"
     subscripts = (t for t in node.targets if isinstance(t, ast.Subscript) and last_name(t.value) == "environ")
-    return any(text_of(t.slice) == "ROS_DOMAIN_ID" for t in subscripts)
+    return any(literal_text(t.slice) == "ROS_DOMAIN_ID" for t in subscripts)
 
 
 @hint_rule(priority=8020)
@@ -250,7 +250,7 @@ def _deaf_subscription(case: Case) -> _Deaf | None:
 @hint_rule(priority=8060)
 def _kept_apart(case: Case) -> Clue | None:
     """Two files are correct by themselves, but cannot communicate."""
-    for topic in named(case.check, *roles_of(type(case.check)).topics):
+    for topic in texts_under(case.check, *roles_of(type(case.check)).topics):
         ends = student_endpoints(case.trace, topic=topic)
         here = [e for e in ends if e.kind == "publisher"]
         there = [e for e in ends if e.kind == "subscription"]
@@ -591,7 +591,7 @@ def _held_up(unseen: _Unseen) -> Clue | None:
     """A long sleep, or a waiting loop, comes before the node spins."""
     source = unseen.source
     for call in source.calls("sleep"):
-        worth = constant(source, argument(call, 0, "secs"))
+        worth = constant_value(source, argument(call, 0, "secs"))
         early = source.function_name(call) in ("", "__init__", "main")
         if early and worth is not None and worth.value >= _LONG_SLEEP_S:
             return Clue(f"{source.code(call)} blocks everything: the node does nothing meanwhile", source.place(call))
@@ -645,7 +645,7 @@ def _late_timer(unseen: _Unseen) -> Clue | None:
         return None
     source, latest_s = unseen.source, seconds(unseen.case.trace.stop_ns) - 1
     for item in made(source, "timer"):
-        worth = constant(source, item.period)
+        worth = constant_value(source, item.period)
         inside = set(runs(source, item))
         if worth is not None and worth.value > latest_s and any(c in inside for c in unseen.calls):
             hint = f"{timer_code(source, item)} waits {worth.value:g} s before the first call: the period is in seconds"

@@ -6,7 +6,7 @@ from grader.grading.judging.diagnosis.rules import Case, Clue, file_for, hint_ru
 from grader.grading.judging.diagnosis.wiring import made_for
 from grader.grading.judging.simulations import NotHeard, not_heard
 from grader.grading.judging.values import student_endpoints
-from grader.grading.model.exercise import named, roles_of
+from grader.grading.model.exercise import roles_of, texts_under
 
 
 @hint_rule(priority=10)
@@ -27,7 +27,7 @@ def _may_explain(found: NotHeard, case: Case) -> bool:
     """Return whether a criterion is about the commands, or about what the simulation makes of them."""
     if case.logs:
         return False
-    topics = {*case.topics, *named(case.check, *roles_of(type(case.check)).topics)}
+    topics = {*case.topics, *texts_under(case.check, *roles_of(type(case.check)).topics)}
     if topics & {found.topic, found.end.topic}:
         return True
     heard = {end.topic for end in student_endpoints(case.trace, "subscription")}

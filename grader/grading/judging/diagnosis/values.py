@@ -10,7 +10,7 @@ from typing import Any
 from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule
 from grader.grading.judging.diagnosis.wiring import (
     Constant,
-    constant,
+    constant_value,
     given_leaf,
     made,
     made_for,
@@ -24,7 +24,14 @@ from grader.grading.judging.diagnosis.wiring import (
 )
 from grader.grading.judging.facts import DrawFacts
 from grader.grading.judging.source import Function, Source, chain, first_line, last_name, words
-from grader.grading.judging.values import as_number, leaves, number_path, published, published_numbers, value_at
+from grader.grading.judging.values import (
+    as_number,
+    number_path,
+    numbers_by_path,
+    published,
+    published_numbers,
+    value_at,
+)
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import moment, number
 from grader.runtime.model.dataclass import dataclass
@@ -78,13 +85,13 @@ def _given_values(source: Source, path: str) -> list[_Given]:
     """Return the statements that set a field such as `linear.x`, by assignment or keyword argument."""
     group, _, leaf = path.partition(".")
     pairs = (p for s in source.all(ast.Assign) for p in _assigned(s))
-    found = [_Given(s, v, constant(source, v)) for s, t, v in pairs if chain(t).endswith(f".{path}")]
+    found = [_Given(s, v, constant_value(source, v)) for s, t, v in pairs if chain(t).endswith(f".{path}")]
     for call in source.all(ast.Call):
         around = source.parents.get(call)
         outer = around.arg if isinstance(around, ast.keyword) else ""
         whole = isinstance(around, ast.Assign) and any(chain(t).endswith(f".{group}") for t in around.targets)
         own = [k for k in call.keywords if k.arg == leaf and (outer == group or whole)]
-        found += [_Given(k, k.value, constant(source, k.value)) for k in own]
+        found += [_Given(k, k.value, constant_value(source, k.value)) for k in own]
     return sorted(found, key=lambda g: first_line(g.node))
 
 
@@ -169,7 +176,7 @@ def _used(source: Source, owner: str, begin: ast.AST, end: ast.AST) -> bool:
 @hint_rule("field_values", given=_wrong, priority=10020)
 def _misplaced_field(wrong: _Wrong) -> Clue | None:
     """The right numbers are in the wrong fields."""
-    numbers = leaves(wrong.message.value)
+    numbers = numbers_by_path(wrong.message.value)
     for path, value in wrong.found.items():
         want = wrong.wanted[path]
         alike = [p for p, v in numbers.items() if p != path and _is(v, want)]
@@ -204,7 +211,7 @@ def _exchanged(case: Case, path: str, other: str, value: float) -> bool:
 @hint_rule("field_values", given=_wrong, priority=10030)
 def _strayed_value(wrong: _Wrong) -> Clue | None:
     """A field holds the value expected in another field, which does not have it."""
-    numbers = leaves(wrong.message.value)
+    numbers = numbers_by_path(wrong.message.value)
     others = {p: v for check in wrong.case.asked("field_values") for p, v in check.values.items()}
     for path, value in wrong.found.items():
         homes = [p for p, v in others.items() if _is(v, value) and p in numbers and not _is(numbers[p], v)]

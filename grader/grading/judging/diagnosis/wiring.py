@@ -18,9 +18,9 @@ from grader.grading.judging.source import (
     chain,
     first_line,
     last_name,
+    literal_text,
     parameters,
     subtree,
-    text_of,
 )
 from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
@@ -54,7 +54,7 @@ class Constant:
     origin: ast.AST
 
 
-def constant(source: Source, node: ast.AST | None, depth: int = 0) -> Constant | None:
+def constant_value(source: Source, node: ast.AST | None, depth: int = 0) -> Constant | None:
     """Return the value of an expression, or None if it cannot be read from the text."""
     if node is None or depth > _DEEPEST:
         return None
@@ -82,22 +82,22 @@ def _named(source: Source, node: ast.Name | ast.Attribute, depth: int) -> Consta
         found = _parameter(source, node.value, depth)
         if found is not None:
             return found
-    return constant(source, _only_assignment(source, node), depth + 1)
+    return constant_value(source, _only_assignment(source, node), depth + 1)
 
 
 def number_in_code(source: Source, node: ast.AST | None) -> float | None:
     """Return the value of an expression, or None."""
-    found = constant(source, node)
+    found = constant_value(source, node)
     return None if found is None else found.value
 
 
 def _arithmetic(source: Source, node: ast.UnaryOp | ast.BinOp, depth: int) -> Constant | None:
     if isinstance(node, ast.UnaryOp):
-        inner = constant(source, node.operand, depth + 1)
+        inner = constant_value(source, node.operand, depth + 1)
         if inner is None or not isinstance(node.op, (ast.USub, ast.UAdd)):
             return None
         return Constant(-inner.value if isinstance(node.op, ast.USub) else inner.value, node)
-    left, right = constant(source, node.left, depth + 1), constant(source, node.right, depth + 1)
+    left, right = constant_value(source, node.left, depth + 1), constant_value(source, node.right, depth + 1)
     apply = _BINARY.get(type(node.op))
     if left is None or right is None or apply is None:
         return None
@@ -114,7 +114,7 @@ def _called(source: Source, call: ast.Call, depth: int) -> Constant | None:
     apply = _FUNCTIONS.get(chain(call.func))
     if apply is None or len(call.args) != 1 or call.keywords:
         return None
-    inner = constant(source, call.args[0], depth + 1)
+    inner = constant_value(source, call.args[0], depth + 1)
     try:
         return None if inner is None else Constant(apply(inner.value), call)
     except (ArithmeticError, ValueError):
@@ -128,12 +128,12 @@ def _parameter(source: Source, call: ast.AST, depth: int) -> Constant | None:
     if not isinstance(call, ast.Call):
         return None
     if last_name(call.func) == "declare_parameter":
-        return constant(source, argument(call, 1, "value"), depth + 1)
-    name = text_of(argument(call, 0, "name"))
+        return constant_value(source, argument(call, 1, "value"), depth + 1)
+    name = literal_text(argument(call, 0, "name"))
     if last_name(call.func) != "get_parameter" or name is None:
         return None
-    declared = [c for c in source.calls("declare_parameter") if text_of(argument(c, 0, "name")) == name]
-    return constant(source, argument(declared[0], 1, "value"), depth + 1) if len(declared) == 1 else None
+    declared = [c for c in source.calls("declare_parameter") if literal_text(argument(c, 0, "name")) == name]
+    return constant_value(source, argument(declared[0], 1, "value"), depth + 1) if len(declared) == 1 else None
 
 
 def _only_assignment(source: Source, name: ast.Name | ast.Attribute) -> ast.expr | None:
@@ -263,7 +263,7 @@ def _made(source: Source, kind: str, call: ast.Call) -> Made:
 
 def text_in_code(source: Source, node: ast.expr | None, depth: int = 0) -> str | None:
     """Return the text of a literal, or of a name that is assigned a literal."""
-    literal = text_of(node)
+    literal = literal_text(node)
     if literal is not None or node is None or depth > 3:
         return literal
     if isinstance(node, ast.Name):
@@ -279,7 +279,7 @@ def text_in_code(source: Source, node: ast.expr | None, depth: int = 0) -> str |
 def text_origin(source: Source, node: ast.expr | None, otherwise: ast.AST) -> ast.AST:
     """Return the literal of a text, also of one that has a name; `otherwise` if the text does not show it."""
     for _ in range(3):
-        if text_of(node) is not None and node is not None:
+        if literal_text(node) is not None and node is not None:
             return node
         value = value_of(source, node)
         node = value if isinstance(value, ast.expr) else None
@@ -444,7 +444,7 @@ def switches(source: Source, limit: float | None = None) -> list[Switch]:
     for node in source.all(ast.Compare):
         if len(node.ops) != 1:
             continue
-        left, right = constant(source, node.left), constant(source, node.comparators[0])
+        left, right = constant_value(source, node.left), constant_value(source, node.comparators[0])
         op: ast.cmpop = node.ops[0]
         if right is not None and left is None and isinstance(op, ORDERS):
             found.append(Switch(node, op, right, node.left))
@@ -498,7 +498,7 @@ def used(source: Source, function: Function) -> bool:
     """Return whether a function's name is used outside of it."""
     inside = set(subtree(function))
     names = (n for n in source.names() if last_name(n) == function.name and n not in inside)
-    listed = any(text_of(n) == function.name for n in source.all(ast.Constant))
+    listed = any(literal_text(n) == function.name for n in source.all(ast.Constant))
     return listed or any(isinstance(n.ctx, ast.Load) for n in names)
 
 

@@ -158,7 +158,7 @@ def _ways(outputs: Sequence[Output]) -> list[int]:
     return [reading for reading, bodies in enumerate(zip(*texts, strict=True)) if any(b is not None for b in bodies)]
 
 
-def surroundings(outputs: Sequence[Output], one: Sought) -> str:
+def other_numbers(outputs: Sequence[Output], one: Sought) -> str:
     """Return a clause about the other numbers in the texts that show a value."""
     texts = [o.text for o, _ in _active(outputs, [one])]
     count = sum(len(printed_numbers(clean(text))) for text in texts)

@@ -83,26 +83,26 @@ class FinalMark:
     criteria: Mapping[str, CriterionMark] = field(default_factory=dict)
 
 
-def place(name: str, content: str) -> Markup:
+def replaceable(name: str, content: str) -> Markup:
     """Return content of a page that `with_final_mark` may replace; the content is markup."""
     return Markup(f"<!--{name}-->{content}<!--/{name}-->")  # noqa: S704  the content is escaped where it is made
 
 
 def score_place(score: ScoreShown) -> Markup:
     """Return the score at the top of a page."""
-    return place("score", page_template("score").render(score=score))
+    return replaceable("score", page_template("score").render(score=score))
 
 
 def points_place(exercise: str, score: Fraction, max_score: Fraction) -> Markup:
     """Return the points of an exercise."""
-    return place(f"points:{exercise}", _points(score, max_score))
+    return replaceable(f"points:{exercise}", _points(score, max_score))
 
 
 def earned_place(criterion: str, mark: CriterionMark) -> Markup:
     """Return the points of a criterion, with a word if an instructor wrote something about it."""
     words = "decided" if mark.decision else "comment" if mark.comment else ""
     tag = f'<span class="decided">{words}</span> ' if words else ""
-    return place(f"earned:{criterion}", f"{tag}{_points(mark.score, mark.max_score)}")
+    return replaceable(f"earned:{criterion}", f"{tag}{_points(mark.score, mark.max_score)}")
 
 
 def decision_place(criterion: str, mark: CriterionMark) -> Markup:
@@ -113,7 +113,7 @@ def decision_place(criterion: str, mark: CriterionMark) -> Markup:
         for name, text in rows
         if text
     )
-    return place(f"decision:{criterion}", made)
+    return replaceable(f"decision:{criterion}", made)
 
 
 def _points(score: Fraction, max_score: Fraction) -> str:
@@ -134,8 +134,8 @@ def with_final_mark(page: str, mark: FinalMark) -> str:
 
 
 def _places(mark: FinalMark) -> Iterator[tuple[str, str]]:
-    yield "student", place("student", str(escape(shown(mark.student, limit=wording.NAME_LIMIT))))
-    yield "final-mark", place("final-mark", page_template("final-mark").render(mark=mark))
+    yield "student", replaceable("student", str(escape(shown(mark.student, limit=wording.NAME_LIMIT))))
+    yield "final-mark", replaceable("final-mark", page_template("final-mark").render(mark=mark))
     if mark.score is not None:
         yield "score", score_place(mark.score)
     for id_, (score, max_score) in mark.exercises.items():

@@ -209,7 +209,7 @@ def render_html(report: Report, *, assets: str | None = None, recordings: str = 
         figures=Markup(script_json({"figures": figures, "columns": columns.lists})),  # noqa: S704  the function exists to make it safe in a script element
         embedded=Markup,
         clock_wall=ClockKind.WALL,
-        command=" ".join(wording.command(report)),
+        command=" ".join(wording.reproducing_command(report)),
         score=score_place(score_shown(report)),
         for_student=report.audience is Audience.STUDENT,
         first=wording.first_to_fix(report) if report.audience is Audience.STUDENT else None,

@@ -48,7 +48,7 @@ def result(report: Report) -> JsonObject:
         "exact_max_score": json_value(report.max_score),
         "isolation": report.environment.isolation,
         "opening": wording.opening(report),
-        "reproduce": wording.ending(report),
+        "reproduce": wording.ending_lines(report),
     }
 
 

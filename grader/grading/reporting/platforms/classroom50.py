@@ -150,5 +150,5 @@ def _about(report: Report) -> JsonObject:
         "isolation": report.environment.isolation,
         "opening": wording.opening(report),
         "remarks": {e.id: remarks for e in report.exercises if (remarks := wording.remarks(e))},
-        "reproduce": wording.ending(report),
+        "reproduce": wording.ending_lines(report),
     }

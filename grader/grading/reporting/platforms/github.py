@@ -40,11 +40,11 @@ def render_github(report: Report, *, folder: str | None) -> str:
     lines += [
         log_lines(f"{wording.exercise_line(e)}: {remark}") for e in report.exercises for remark in wording.remarks(e)
     ]
-    return "\n".join([*lines, *map(log_lines, wording.ending(report))]) + "\n"
+    return "\n".join([*lines, *map(log_lines, wording.ending_lines(report))]) + "\n"
 
 
 def _notice(report: Report) -> _Annotation:
-    lines = [wording.headline(report), wording.summary(report), *wording.notes(report), *wording.ending(report)]
+    lines = [wording.headline(report), wording.summary(report), *wording.notes(report), *wording.ending_lines(report)]
     message = "\n".join(lines)
     return _Annotation("notice", f"Score: {wording.score_line(report)}", message)
 

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from grader.cli.main import app
-from grader.course.classroom.cluster.dispatcher import address_of, connected
+from grader.course.classroom.cluster.dispatcher import connected, scheduler_address
 from grader.runtime.model.errors import EnvironmentFault
 
 
@@ -59,8 +59,8 @@ def test_a_scheduler_file_holds_the_address(tmp_path: Path) -> None:
     """As `dask scheduler --scheduler-file` writes it."""
     path = tmp_path / "scheduler.json"
     path.write_text(json.dumps({"address": "tcp://10.0.0.1:8786", "workers": {}}), encoding="utf-8")
-    assert address_of(str(path)) == "tcp://10.0.0.1:8786"
-    assert address_of("tls://h:1") == "tls://h:1"
+    assert scheduler_address(str(path)) == "tcp://10.0.0.1:8786"
+    assert scheduler_address("tls://h:1") == "tls://h:1"
 
 
 @pytest.mark.parametrize("content", [None, "", "[]", "{}", "[" * 100_000])
@@ -70,4 +70,4 @@ def test_another_file_is_refused(tmp_path: Path, content: str | None) -> None:
     if content is not None:
         path.write_text(content, encoding="utf-8")
     with pytest.raises(EnvironmentFault, match=r"--scheduler .*scheduler\.json: expected"):
-        address_of(str(path))
+        scheduler_address(str(path))

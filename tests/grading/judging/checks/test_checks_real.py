@@ -7,7 +7,7 @@ import pytest
 from places import ROOT, TESTS
 
 from grader.grading.app.request import GradeRequest
-from grader.grading.app.start import grade
+from grader.grading.app.start import grade_once
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.run_check import check_name
 from grader.grading.rubrics.builtin import builtin_rubrics
@@ -36,7 +36,7 @@ def test_every_check_has_golden_traces_and_a_real_run(name: str) -> None:
 
 def outcomes(folder: Path, rubric: str) -> tuple[list[tuple[str, str]], dict[str, str]]:
     """Grade a folder and return the outcome of each criterion by its check's name, with its reason."""
-    report = grade(GradeRequest(str(folder), rubrics=(REAL / rubric,), clock="virtual"), lambda _: None)
+    report = grade_once(GradeRequest(str(folder), rubrics=(REAL / rubric,), clock="virtual"), lambda _: None)
     verdicts = report.exercises[0].verdicts
     told = {v.id: v.reason for v in verdicts}
     return [(name, v.outcome.value) for name, v in zip(asked_in(REAL / rubric), verdicts, strict=True)], told

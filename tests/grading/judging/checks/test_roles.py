@@ -11,7 +11,7 @@ from tracing import FLOAT32, Recording
 
 from grader.grading.judging.checks import CHECKS
 from grader.grading.judging.judge_run import judge_exercise
-from grader.grading.model.exercise import Criterion, Exercise, Outcome, named, roles_of
+from grader.grading.model.exercise import Criterion, Exercise, Outcome, roles_of, texts_under
 from grader.grading.model.report import Verdict
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Scenario, Span
@@ -54,8 +54,8 @@ def test_every_check_of_a_topic_says_what_it_is() -> None:
     silent = {name for name, check in INSTANCES.items() if hasattr(check, "subscribes")}  # its topics are tuples
     for name, kind in CHECKS.items():
         roles, check = roles_of(kind), INSTANCES[name]
-        declared = named(check, *roles.speaks, *roles.hears, *roles.given, *roles.logs)
-        if named(check, *roles.topics) and not declared:
+        declared = texts_under(check, *roles.speaks, *roles.hears, *roles.given, *roles.logs)
+        if texts_under(check, *roles.topics) and not declared:
             silent.add(name)
     assert silent == WITHOUT.keys()
 
@@ -79,7 +79,7 @@ def test_a_silent_topic_gets_a_hint_with_its_line(name: str) -> None:
     """Whichever check misses the messages: the publisher of the other topic is named."""
     verdict = judged(name)
     assert verdict.outcome is not Outcome.MET
-    (topic,) = named(SPEAKING[name], *roles_of(CHECKS[name]).speaks)
+    (topic,) = texts_under(SPEAKING[name], *roles_of(CHECKS[name]).speaks)
     assert f"'/elsewhere', 10) publishes on /elsewhere: the task asks for {topic}" in verdict.hint
     assert verdict.location is not None
     assert verdict.location.line == 9

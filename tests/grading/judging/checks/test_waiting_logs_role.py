@@ -9,18 +9,8 @@ from typing import ClassVar
 
 from tracing import Recording
 
-from grader.api import (
-    NS_PER_S,
-    Finding,
-    Roles,
-    Trace,
-    WrongLogFacts,
-    met,
-    not_met,
-    only_printed,
-    printed_lines,
-    student_records,
-)
+from grader.api import NS_PER_S, Finding, Roles, Trace, met, not_met, printed_lines, student_records
+from grader.api.unstable import WrongLogFacts, only_printed
 from grader.grading.judging.checks.waiting import WaitsGracefully
 from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.model.exercise import Check, Criterion, Exercise

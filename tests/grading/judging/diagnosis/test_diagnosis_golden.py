@@ -30,7 +30,7 @@ from test_simulated import RULE as SIMULATED
 from tiers import each, more
 
 from grader.grading.judging.diagnosis import CAUSE_KEY, RULES, cases_of, diagnose, rules_of
-from grader.grading.judging.diagnosis.rules import FIRST, Case, Rule, in_order
+from grader.grading.judging.diagnosis.rules import FIRST, Case, Rule, rules_in_order
 from grader.grading.judging.judge_run import undiagnosed
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import ExerciseReport, Verdict
@@ -184,7 +184,7 @@ def test_every_rule_is_shown_to_work() -> None:
 def test_the_rules_are_asked_in_the_order_that_is_written_down() -> None:
     """Wherever a rule is defined: its priority alone decides."""
     order = (HERE / "order.txt").read_text("utf-8").split()
-    assert [rule.id for rule in in_order(EVERY)] == [*order, "follows"]
+    assert [rule.id for rule in rules_in_order(EVERY)] == [*order, "follows"]
     priorities = [rule.priority for rule in EVERY]
     assert len(set(priorities)) == len(priorities)
     assert min(priorities) >= 1000 > FIRST

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from work import calls_in
 
 from grader.grading.judging.diagnosis import placed
-from grader.grading.judging.diagnosis.wiring import constant, goes_to, made
-from grader.grading.judging.source import LONGEST_SOURCE, chain, last_line, read
+from grader.grading.judging.diagnosis.wiring import constant_value, goes_to, made
+from grader.grading.judging.source import LONGEST_SOURCE, chain, last_line, read_source
 from grader.grading.submissions.sources import read_sources
 from grader.runtime.model.limits import MAX_SOURCE_BYTES
 from grader.runtime.model.submission import StudentFile, Submission
@@ -188,16 +188,16 @@ class N:
     def other(self):
         self.twice = 2
 """
-    source = read("n.py", text)
+    source = read_source("n.py", text)
     (call,) = source.calls("call")
-    found = constant(source, call.args[0])
+    found = constant_value(source, call.args[0])
     assert (found.value if found else None) == value
 
 
 def test_the_origin_of_a_constant_is_where_it_is_written_down() -> None:
     """That is the line a student has to change."""
-    source = read("n.py", "RATE = 10\n\nnode.create_timer(1.0 / RATE, f)\n")
-    found = constant(source, made(source, "timer")[0].period)
+    source = read_source("n.py", "RATE = 10\n\nnode.create_timer(1.0 / RATE, f)\n")
+    found = constant_value(source, made(source, "timer")[0].period)
     assert found is not None
     assert source.place(found.origin).line == 1
 
@@ -207,7 +207,7 @@ def test_the_origin_of_a_constant_is_where_it_is_written_down() -> None:
 
 def test_code_is_quoted_on_one_line() -> None:
     """Several lines are joined, umlauts before it do not shift it, and long code is cut."""
-    source = read("n.py", "grüße = 'äöü'; f(a,\n      b)\n" + "g(" + "x, " * 200 + ")\n")
+    source = read_source("n.py", "grüße = 'äöü'; f(a,\n      b)\n" + "g(" + "x, " * 200 + ")\n")
     first, second = source.calls("f", "g")
     assert source.code(first) == "f(a, b)"
     assert source.code(second).endswith("…")
@@ -243,7 +243,7 @@ def test_topics_as_written_and_on_the_wire(written: str | None, topic: str, same
 
 def test_a_long_file_is_not_parsed() -> None:
     """It keeps the lines that are looked at."""
-    source = read("n.py", "x = 1\n" * (LONGEST_SOURCE // 4))
+    source = read_source("n.py", "x = 1\n" * (LONGEST_SOURCE // 4))
     assert source.tree is None
     assert source.line(1) == "x = 1"
     assert last_line(ast.Pass()) == 0

@@ -9,7 +9,7 @@ import pytest
 from places import REPORTED
 from tiers import NIGHTLY, but, each, more
 
-from grader.grading.app.observe import ObserveRequest, observe
+from grader.grading.app.observe import ObserveRequest, observe_programs
 from grader.grading.model.report import Summary
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import ClockKind
@@ -120,7 +120,7 @@ LOOKING = {
 def watched(tmp_path: Path, text: str, clock: str, duration_s: int = 2) -> Summary:
     file = tmp_path / "program.py"
     file.write_text(text)
-    return observe(ObserveRequest((file,), duration_s * NS_PER_S, clock=clock), lambda _: None)
+    return observe_programs(ObserveRequest((file,), duration_s * NS_PER_S, clock=clock), lambda _: None)
 
 
 def says(texts: list[str], logged: list[str], clock: str) -> bool:
@@ -171,7 +171,7 @@ def test_importing_a_library_that_plots_is_no_reason_for_the_wall_clock(clock: s
     """Nor is it one to start a program that lists fonts."""
     pytest.importorskip("matplotlib")
     file = REPORTED / "matplotlib_import.py"
-    summary = observe(ObserveRequest((file,), 10 * NS_PER_S, clock=clock), lambda _: None)
+    summary = observe_programs(ObserveRequest((file,), 10 * NS_PER_S, clock=clock), lambda _: None)
     assert clock == "wall" or (summary.clock_reason, len(summary.records)) == ("", 9)
     assert {record.text for record in summary.records} == {"tick"}
     assert summary.faults == ()
