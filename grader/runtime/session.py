@@ -22,7 +22,7 @@ from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.choose import OWN_PROGRAMS, Machine, TierChoice, choose_isolation
 from grader.runtime.sandbox.protocol import Isolation
 from grader.runtime.supervisor.byte_code import compile_own
-from grader.runtime.supervisor.next_recording import AUTO, VIRTUAL, WALL, Wanted, next_recording
+from grader.runtime.supervisor.next_recording import AUTO, VIRTUAL, WALL, NextRecording, next_recording
 from grader.runtime.supervisor.real_time_budget import RealTimeBudget
 from grader.runtime.supervisor.stepping import SteppedRun
 from grader.runtime.supervisor.supervisor import MARGIN_S, TRIES, Job, Recorder, WorkerLostError
@@ -121,7 +121,7 @@ class RecordingSession:
             if finished is not None:
                 finished(key, traces[key])
 
-        made: dict[Key, list[tuple[Wanted, Trace]]] = {}
+        made: dict[Key, list[tuple[NextRecording, Trace]]] = {}
         for key, job in jobs.items():
             # What no interpreter can run needs no worker.
             if (needless := trace_without_run(job.plan, job.programs)) is not None:
@@ -130,7 +130,7 @@ class RecordingSession:
                 made[key] = []
         while made:
             wanted = {key: next_recording(so_far, clock, on_wall=on_wall) for key, so_far in made.items()}
-            wave = [(key, want) for key, want in wanted.items() if isinstance(want, Wanted)]
+            wave = [(key, want) for key, want in wanted.items() if isinstance(want, NextRecording)]
             wave = [one for one in wave if one[1].clock != WALL or clock == WALL] or wave[:1]
             again = [
                 Job(

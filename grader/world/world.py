@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
 
-from grader.grading.model.wording import nearest
+from grader.grading.model.wording import first_few, nearest
 from grader.runtime.message_classes import built, plain_fields
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, RecordingError

@@ -19,7 +19,7 @@ from grader.runtime.host.protocol import (
     Note,
     Progress,
     Report,
-    checked,
+    checked_report,
 )
 from grader.runtime.model.trace import Endpoint, Fault, GraphSnapshot, OutputLine
 from grader.runtime.plan import Plan
@@ -190,7 +190,7 @@ class ScriptedStudent:
         """Return the next report, checked as what comes from any process."""
         if self._discovery:
             self._discovery = False
-            return checked({"kind": "matched", "missing": self.missing})
+            return checked_report({"kind": "matched", "missing": self.missing})
         answer, self._answer = self._answer, None
         try:
             if not self._begun:
@@ -201,7 +201,7 @@ class ScriptedStudent:
         except StopIteration:
             report = {"kind": "exited", "code": 0}
         self.cost_ns = (report or {}).get("cost_ns", 0)
-        return None if report is None else checked(report)
+        return None if report is None else checked_report(report)
 
     def reports(self) -> list[Report | None]:
         """Return what has come without waiting, for the wall clock: a report, or nothing for an empty one."""
@@ -209,7 +209,7 @@ class ScriptedStudent:
         found = next(self._program, {"kind": "silent"})
         if found is None:
             return [None]
-        return [] if found.get("kind") == "silent" else [checked(found)]
+        return [] if found.get("kind") == "silent" else [checked_report(found)]
 
     def output(self, t_ns: int, *, final: bool = False) -> list[OutputLine]:
         """Return what was written since the last time."""

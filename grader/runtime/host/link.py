@@ -9,7 +9,7 @@ import os
 import socket
 
 from . import originals
-from .protocol import Answer, Report, answer_of, line_of
+from .protocol import Answer, Report, decoded_answer, encoded_line
 
 #: The most that is read at once.
 ANSWER_BYTES = 1 << 16
@@ -33,7 +33,7 @@ class Link:
 
     def send(self, report: Report) -> None:
         """Send one report; raises OSError if the grader is gone, which ends the process."""
-        line = line_of(report)
+        line = encoded_line(report)
         with self._sending:
             if not self._cut:
                 self._socket.sendall(line)
@@ -60,7 +60,7 @@ class Link:
                 raise ConnectionError("the grader is gone")
             self._received += received
         line, _, self._received = self._received.partition(b"\n")
-        return answer_of(line)
+        return decoded_answer(line)
 
 
 class Log:

@@ -4,7 +4,7 @@ The host in the process reports, and the worker answers. Both send lines of JSON
 inherits: an object with the `kind` of what is said, and the fields of its type that are not as usual. The types lie in
 the host's folder because a sandboxed process sees nothing else of the grader.
 
-The host believes the worker. The worker believes nothing: the program can write to the same socket. So `report_of`
+The host believes the worker. The worker believes nothing: the program can write to the same socket. So `decoded_report`
 builds each report by the `checked` of its type: a field that is not what it should be is as if it had not been sent,
 and what is no report becomes `NeverSent`. What a field says is not checked here where that takes the submission or the
 plan: that a file has a line, or that a limit explains an end.
@@ -557,28 +557,28 @@ _CHECKS: Mapping[str, Callable[[Mapping[str, Any]], Report]] = {kind: said.check
 _ANSWERED: Mapping[str, Callable[..., Answer]] = {kind: said for said, kind in _ANSWERS.items()}
 
 
-def line_of(said: Report | Answer) -> bytes:
+def encoded_line(said: Report | Answer) -> bytes:
     """Return the line that says a report or an answer."""
-    return json.dumps({"kind": _KINDS[type(said)], **plain(said)}).encode() + b"\n"
+    return json.dumps({"kind": _KINDS[type(said)], **unusual_fields(said)}).encode() + b"\n"
 
 
-def report_of(line: bytes | str) -> Report | None:
+def decoded_report(line: bytes | str) -> Report | None:
     """Return the report that a line from a student's process says; None if it says nothing."""
     try:
         data = json.loads(line if isinstance(line, str) else line.decode())
     except (ValueError, RecursionError):
         return None
-    return checked(data) if isinstance(data, dict) else None
+    return checked_report(data) if isinstance(data, dict) else None
 
 
-def checked(data: Mapping[str, Any]) -> Report:
+def checked_report(data: Mapping[str, Any]) -> Report:
     """Return what an object from a student's process reports."""
     kind = data.get("kind")
     check = _CHECKS.get(kind) if isinstance(kind, str) else None
     return NeverSent() if check is None else check(data)
 
 
-def answer_of(line: bytes) -> Answer:
+def decoded_answer(line: bytes) -> Answer:
     """Return the answer that a line from the worker says."""
     data = json.loads(line)
     kind = data.pop("kind")
@@ -587,7 +587,7 @@ def answer_of(line: bytes) -> Answer:
     return _ANSWERED[kind](**data)
 
 
-def plain(said: Any) -> dict[str, Any]:
+def unusual_fields(said: Any) -> dict[str, Any]:
     """Return the fields that are not as usual, as plain values; those of `Progress` stand beside the others."""
     usual: Mapping[str, Any] = said._field_defaults
     found: dict[str, Any] = {}
@@ -595,11 +595,11 @@ def plain(said: Any) -> dict[str, Any]:
         if name in usual and value == usual[name]:
             continue
         if isinstance(value, Progress):
-            found.update(plain(value))
+            found.update(unusual_fields(value))
         elif hasattr(value, "_fields"):
-            found[name] = plain(value)
+            found[name] = unusual_fields(value)
         elif isinstance(value, (list, tuple)):
-            found[name] = [plain(one) if hasattr(one, "_fields") else one for one in value]
+            found[name] = [unusual_fields(one) if hasattr(one, "_fields") else one for one in value]
         else:
             found[name] = value
     return found

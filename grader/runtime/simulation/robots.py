@@ -84,9 +84,6 @@ class DifferentialDrive(Unicycle):
 
     Attributes:
         commands: Topic of the commands: linear.x in m/s, angular.z in rad/s.
-        twist: Whether it hears geometry_msgs/msg/Twist.
-        twist_stamped: Whether it hears geometry_msgs/msg/TwistStamped, which robots of ROS 2 Jazzy hear by default; the
-            time in its header is not looked at.
         odometry: Topic of the odometry: position in m, orientation as a quaternion, twist in the robot's own frame.
         max_speed: Largest speed, forward or backward, in m/s.
         max_turn_rate: Largest turn rate, in rad/s.
@@ -96,12 +93,13 @@ class DifferentialDrive(Unicycle):
         frame: Frame of the odometry.
         child_frame: Frame of the robot.
         transforms: Whether it also publishes the transform between them, on /tf as tf2_msgs/msg/TFMessage.
+        twist: Whether it hears geometry_msgs/msg/Twist.
+        twist_stamped: Whether it hears geometry_msgs/msg/TwistStamped, which robots of ROS 2 Jazzy hear by default; the
+            time in its header is not looked at.
         period: Time between two messages.
     """
 
     commands: Topic = "/cmd_vel"
-    twist: bool = True
-    twist_stamped: bool = False
     odometry: Topic = "/odom"
     max_speed: float = 10.0
     max_turn_rate: float = 10.0
@@ -111,6 +109,8 @@ class DifferentialDrive(Unicycle):
     frame: str = "odom"
     child_frame: str = "base_link"
     transforms: bool = False
+    twist: bool = True
+    twist_stamped: bool = False
     period: DurationNs = 50 * NS_PER_MS
     _draw: random.Random = field(default_factory=random.Random, init=False, repr=False)
 

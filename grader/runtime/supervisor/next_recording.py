@@ -29,7 +29,7 @@ HELD_UP_SHARE = 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class NextRecording:
     """A recording to make.
 
     Attributes:
@@ -53,14 +53,14 @@ class Wanted:
 
 
 #: With the time of all work, and of what is surely work on an idle machine too.
-COUNTED, SURELY_COUNTED = Wanted(charged=1.0, may_stop=True), Wanted(charged=SURE_SHARE)
+COUNTED, SURELY_COUNTED = NextRecording(charged=1.0, may_stop=True), NextRecording(charged=SURE_SHARE)
 #: What was recorded of a scenario so far, in order.
-Made = Sequence[tuple[Wanted, Trace]]
+Made = Sequence[tuple[NextRecording, Trace]]
 
 
 def next_recording(  # noqa: PLR0911  one for each row of the table
     made: Made, clock: str, *, on_wall: bool = True
-) -> Wanted | Trace:
+) -> NextRecording | Trace:
     """Return the recording to make next, or the trace that counts.
 
     | recorded so far | next |
@@ -81,7 +81,7 @@ def next_recording(  # noqa: PLR0911  one for each row of the table
             virtual time, with the reason.
     """
     if not made:
-        return Wanted(WALL if clock == WALL else VIRTUAL, may_stop=clock == AUTO)
+        return NextRecording(WALL if clock == WALL else VIRTUAL, may_stop=clock == AUTO)
     plain = made[0][1]
     # A failure of the grader's own code is not one of virtual time, unless it makes that unsuitable.
     if clock != AUTO or plain.harness_problem not in ("", plain.clock_reason):
@@ -99,7 +99,7 @@ def next_recording(  # noqa: PLR0911  one for each row of the table
         return replace(plain, clock_reason=reason)
     wall = next((replace(trace, clock_reason=reason) for wanted, trace in made if wanted.clock == WALL), None)
     if wall is None:
-        return Wanted(WALL)
+        return NextRecording(WALL)
     # Only where work was the reason: a program that waits for something outside needs the wall clock.
     if not plain.may_drift or not _was_held_up(wall):
         return wall
@@ -109,7 +109,7 @@ def next_recording(  # noqa: PLR0911  one for each row of the table
 
 def _counted(  # noqa: PLR0911  as above
     plain: Trace, wall: Trace, counted: Sequence[Trace], surely: Trace | None
-) -> Wanted | Trace:
+) -> NextRecording | Trace:
     """Return the same where the machine is too busy for the wall clock: a trace that counts the time of the work.
 
     A node that keeps its pace once is fast enough, because a busy machine makes work slower and never faster. One that

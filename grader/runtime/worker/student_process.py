@@ -27,8 +27,8 @@ from grader.runtime.host.protocol import (
     Report,
     ThreadFault,
     WrittenContent,
-    line_of,
-    report_of,
+    decoded_report,
+    encoded_line,
 )
 from grader.runtime.host.written import ALL_BYTES, FILE_BYTES
 from grader.runtime.model.dataclass import dataclass
@@ -205,7 +205,7 @@ class NodeProcess(Process):
     def tell(self, answer: Answer) -> None:
         """Send an answer. A dead process is noticed at its next report."""
         try:
-            self.line.sendall(line_of(answer))
+            self.line.sendall(encoded_line(answer))
         except OSError:
             return
 
@@ -287,7 +287,7 @@ class NodeProcess(Process):
 
     def _parsed_report(self) -> Report | None:
         line, _, self._pending = self._pending.partition(b"\n")
-        report = report_of(line)
+        report = decoded_report(line)
         if isinstance(report, (Exited, ThreadFault, LaunchReport)):
             self.grader_failed = self.grader_failed or graders_fault(self.name, report.fault)
         return report

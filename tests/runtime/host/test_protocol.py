@@ -40,9 +40,9 @@ from grader.runtime.host.protocol import (
     Stop,
     ThreadFault,
     WrittenContent,
-    answer_of,
-    line_of,
-    report_of,
+    decoded_answer,
+    decoded_report,
+    encoded_line,
 )
 
 MADE_UP: tuple[Any, ...] = (None, 1.5, "x", [])
@@ -134,13 +134,13 @@ ANSWERS: tuple[Answer, ...] = (
 def test_what_the_host_reports_is_believed(report: Report) -> None:
     """Field by field: none is lost on the way, and none is taken for another one."""
     assert not any(value in (field, None) for field, value in zip(report._fields, report, strict=True))
-    assert report_of(line_of(report)) == report
+    assert decoded_report(encoded_line(report)) == report
 
 
 @pytest.mark.parametrize("answer", ANSWERS, ids=lambda answer: type(answer).__name__)
 def test_what_the_worker_answers_arrives(answer: Answer) -> None:
     """As it was said."""
-    assert answer_of(line_of(answer)) == answer
+    assert decoded_answer(encoded_line(answer)) == answer
 
 
 def test_all_that_can_be_said_is_tried_here() -> None:
@@ -153,23 +153,23 @@ def test_all_that_can_be_said_is_tried_here() -> None:
 
 def test_what_is_as_usual_is_left_out() -> None:
     """Most of a report is, and a process reports a thousand times a second."""
-    assert line_of(Idle()) == b'{"kind": "idle"}\n'
-    assert line_of(Idle(Progress(now_ns=5), 7)) == b'{"kind": "idle", "now_ns": 5, "wake_ns": 7}\n'
+    assert encoded_line(Idle()) == b'{"kind": "idle"}\n'
+    assert encoded_line(Idle(Progress(now_ns=5), 7)) == b'{"kind": "idle", "now_ns": 5, "wake_ns": 7}\n'
     match = AwaitMatches(NO_COUNTERPARTS, [], 1.0)
-    assert line_of(match) == b'{"kind": "match", "expected": {}, "gone": [], "wait_s": 1.0}\n'
-    assert answer_of(line_of(match)) == match
+    assert encoded_line(match) == b'{"kind": "match", "expected": {}, "gone": [], "wait_s": 1.0}\n'
+    assert decoded_answer(encoded_line(match)) == match
 
 
 @pytest.mark.parametrize("line", [b"", b"no json", b"[1]", b"1", b"null", b"\xff", b"[" * 100_000])
 def test_a_line_without_an_object_says_nothing(line: bytes) -> None:
     """It comes from no host."""
-    assert report_of(line) is None
+    assert decoded_report(line) is None
 
 
 @pytest.mark.parametrize("line", [b"{}", b'{"kind": "go"}', b'{"kind": ["idle"]}', b'{"kind": "early", "topic": "/x"}'])
 def test_an_object_that_the_host_never_sends_is_unknown(line: bytes) -> None:
     """Also one that a worker would send."""
-    assert isinstance(report_of(line), NeverSent)
+    assert isinstance(decoded_report(line), NeverSent)
 
 
 #: Everything that is said, and every field of it: spelled as an attribute everywhere else.

@@ -17,11 +17,11 @@ from grader.runtime.supervisor.next_recording import (
     UNCLEAR,
     VIRTUAL,
     WALL,
-    Wanted,
+    NextRecording,
     next_recording,
 )
 
-FIRST, ON_WALL = Wanted(may_stop=True), Wanted(WALL)
+FIRST, ON_WALL = NextRecording(may_stop=True), NextRecording(WALL)
 
 
 def recorded(clock: ClockKind = ClockKind.VIRTUAL, period_ms: int = 50) -> Trace:
@@ -70,7 +70,9 @@ PLAIN, COUNT, SURE, REAL = (FIRST, DOUBTFUL), (COUNTED, SLOWER), (SURELY_COUNTED
         ([(FIRST, replace(UNFIT, may_drift=True)), REAL], COUNTED),
     ],
 )
-def test_what_was_recorded_says_what_is_next(made: list[tuple[Wanted, Trace]], wanted: Wanted | Trace) -> None:
+def test_what_was_recorded_says_what_is_next(
+    made: list[tuple[NextRecording, Trace]], wanted: NextRecording | Trace
+) -> None:
     """In the order in which a scenario goes through the table."""
     assert next_recording(made, AUTO) == wanted
 
@@ -79,11 +81,11 @@ def test_what_was_recorded_says_what_is_next(made: list[tuple[Wanted, Trace]], w
 def test_a_clock_that_was_asked_for_is_recorded_once(clock: str) -> None:
     """Whatever the recording says of it."""
     first = next_recording([], clock)
-    assert first == Wanted(clock)
+    assert first == NextRecording(clock)
     assert next_recording([(first, UNFIT)], clock) == UNFIT
 
 
 @pytest.mark.parametrize(("made", "reason"), [([(FIRST, UNFIT)], "it waits"), ([PLAIN, COUNT], DRIFTS)])
-def test_without_the_wall_clock_its_reason_is_told(made: list[tuple[Wanted, Trace]], reason: str) -> None:
+def test_without_the_wall_clock_its_reason_is_told(made: list[tuple[NextRecording, Trace]], reason: str) -> None:
     """With what was recorded in virtual time."""
     assert next_recording(made, AUTO, on_wall=False) == replace(made[0][1], clock_reason=reason)

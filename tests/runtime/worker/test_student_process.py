@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.runtime.host.protocol import Exited, Go, Idle, LaunchReport, MessagesArrived, Note, Stop, answer_of
+from grader.runtime.host.protocol import Exited, Go, Idle, LaunchReport, MessagesArrived, Note, Stop, decoded_answer
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.trace import FaultKind, LogRecord, OutputLine, Start, StartWay
 from grader.runtime.sandbox.protocol import Command
@@ -332,7 +332,7 @@ def test_answers_arrive(start: Callable[[str], NodeProcess]) -> None:
     student.tell(Go(3))
     heard = student.report()
     assert isinstance(heard, Note)
-    assert answer_of(heard.code.encode()) == Go(3)
+    assert decoded_answer(heard.code.encode()) == Go(3)
 
 
 def test_two_reports_in_one_piece_are_two(start: Callable[[str], NodeProcess]) -> None:
