@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import re
+from contextlib import suppress
 from dataclasses import dataclass
 
-from grader.api import Case, Clue, LogRecord, Outcome, ProblemKind, calls_of, hint_rule
+from grader.api import Case, Clue, LogRecord, Outcome, ProblemKind, Response, calls_of, hint_rule
 from grader.api.unstable import (
     Function,
     Source,
@@ -147,6 +149,49 @@ def _is_number(source: Source, name: ast.Name | ast.Attribute) -> bool:
     """Return whether a variable is assigned the result of float or int."""
     values = (getattr(source.parents.get(n), "value", None) for n in source.stored.get(chain(name), ()))
     return any(isinstance(v, ast.Call) and chain(v.func) in ("float", "int") for v in values)
+
+
+#: Methods that cut a part out of a text.
+_CUTTING = ("split", "rsplit", "partition", "rpartition", "strip", "lstrip", "rstrip", "replace", "removesuffix")
+
+
+@hint_rule("reacts_to_responses", outcome=Outcome.NOT_MET, priority=3138)
+def _no_number_cut(case: Case) -> Clue | None:
+    """What is cut out of the response is no number: float raises an exception that the program catches."""
+    texts = [str(r.value.get("message", "")) for r in case.trace.of(Response)]
+    text = next(filter(None, texts), "")
+    for call in case.source.calls("float") if text else ():
+        part = _cut_out(call.args[0], case.source, text) if call.args else None
+        if not isinstance(part, str):
+            continue
+        try:
+            float(part)
+        except ValueError:
+            code = case.source.code(call, 60)
+            hint = f"{code} gets '{part.strip()[:30]}', which is no number: cut off what is not part of it"
+            return Clue(hint, case.source.place(call), key="charge")
+    return None
+
+
+def _cut_out(node: ast.AST | None, source: Source, text: str) -> object:
+    """Return what an expression cuts out of the message of a response; None if that is not plain to see."""
+    if isinstance(node, ast.Attribute) and node.attr == "message":
+        return text
+    if isinstance(node, ast.Name):
+        values = [getattr(source.parents.get(n), "value", None) for n in source.stored.get(node.id, ())]
+        return _cut_out(values[0], source, text) if len(values) == 1 else None
+    if isinstance(node, ast.Subscript):
+        whole, place = _cut_out(node.value, source, text), number_in_code(source, node.slice)
+        if isinstance(whole, (list, tuple)) and place is not None and -len(whole) <= place < len(whole):
+            return whole[int(place)]
+        return None
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _CUTTING:
+        whole, given = _cut_out(node.func.value, source, text), [literal_text(a) for a in node.args]
+        if isinstance(whole, str) and None not in given and "" not in given and not node.keywords:
+            with suppress(TypeError):
+                part: object = getattr(whole, node.func.attr)(*given)
+                return part
+    return None
 
 
 #: Functions that make an integer of a number.
@@ -380,6 +425,10 @@ def _answer_line(case: Case) -> Clue | None:
     places = [a for a in given_leaf(source, str(path)) if source.function_of(a) is function]
     if len(places) != 1:
         return None
+    value = getattr(places[0], "value", None)
+    if value is not None and re.search(r"\{[A-Za-z_][^}]*\}", literal_text(value) or ""):
+        hint = f"the f before the string is missing: f{source.code(value, 60)}"
+        return Clue(hint, source.place(places[0]), key="unformatted")
     return Clue(f"{source.code(places[0], 60)} does not give such a text as '{example}'", source.place(places[0]))
 
 

@@ -8,7 +8,13 @@ from collections.abc import Container
 
 from grader.grading.judging.diagnosis.names import NODE_PROPERTIES, closest
 from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule, lines_of
-from grader.grading.judging.diagnosis.wiring import Made, bare_statements, made, target_of
+from grader.grading.judging.diagnosis.wiring import (
+    Made,
+    bare_statements,
+    made,
+    target_of,
+    value_of,
+)
 from grader.grading.judging.source import (
     Function,
     Source,
@@ -132,6 +138,10 @@ def _timed_with_message(crash: Crash, source: Source) -> Clue | None:
         given = next(m.callback for m in made(source, "timer") if last_name(m.callback) == found[1])
         code = source.code(given) if given is not None else found[1]
         return Clue(f"{code} is not bound to an object: pass self.{found[1]}", source.place(given or functions[0]))
+    given = next(m.callback for m in made(source, "timer") if last_name(m.callback) == found[1])
+    if given is not None and any(last_name(m.callback) == found[1] for m in made(source, "subscription")):
+        hint = f"{found[1]} is the callback of the subscription, which passes the message: give the timer a method of "
+        return Clue(f"{hint}its own", source.place(given))
     rest = ", ".join(p for p in parameters(functions[0]) if p != found[2])
     hint = f"a timer calls {found[1]} without arguments: def {found[1]}({rest}):"
     return Clue(hint, source.place(functions[0]))
@@ -519,7 +529,11 @@ def _parameter_arguments(crash: Crash) -> Clue | None:
 def _bad_name(crash: Crash) -> Clue | None:
     if crash.found[1] == "Node":
         return Clue("a node name may contain only letters, digits and underscores")
-    return Clue("a topic name may contain only letters, digits, _ and /, and no part may start with a digit")
+    hint = "a topic name may contain only letters, digits, _ and /, and no part may start with a digit"
+    call = _call_at_fault(crash, "create_publisher", "create_subscription")
+    # Where the name is written, which may be a constant of the file.
+    written = value_of(crash.source, argument(call, 1, "topic")) if call is not None else None
+    return Clue(hint, crash.source.place(written) if written is not None and literal_text(written) is not None else None)
 
 
 @crash_rule("^TypeError|^AttributeError", priority=4130)

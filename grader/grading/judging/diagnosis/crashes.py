@@ -17,6 +17,7 @@ from grader.grading.judging.diagnosis.wiring import (
     returns_nothing,
     roots,
     spins,
+    value_of,
     variable_of,
 )
 from grader.grading.judging.source import (
@@ -65,7 +66,14 @@ def _wrong_field_type(crash: Crash) -> Clue | None:
     return _not_a_float(crash.source, value, target)
 
 
-def _not_a_float(source: Source, value: ast.expr, target: str) -> Clue:
+def _not_a_float(  # noqa: PLR0911  as below
+    source: Source, value: ast.expr, target: str
+) -> Clue:
+    kept = value_of(source, value)
+    if kept is not value and isinstance(kept, ast.Tuple) and len(kept.elts) == 1:
+        code = source.code(value)
+        hint = f"the comma at the end makes a tuple of {code}: write {code} = {source.code(kept.elts[0])}"
+        return Clue(hint, source.place(kept), key="tuple")
     if isinstance(value, ast.Tuple) and len(value.elts) == 1:
         number = source.code(value.elts[0])
         return Clue(f"the comma at the end makes it a tuple: write {target}{number} without the comma", key="tuple")

@@ -130,6 +130,19 @@ def _other_service_type(end: _End) -> Clue | None:
     return None
 
 
+@hint_rule(priority=3025)
+def _waits_while_there(case: Case) -> Clue | None:
+    """A loop goes on while the service is there, and ends while it is not."""
+    for source in case.sources.values():
+        for loop in source.all(ast.While):
+            test = loop.test
+            if isinstance(test, ast.Call) and last_name(test.func) in ("wait_for_service", "wait_for_server"):
+                code = source.code(test, 60)
+                hint = f"{code} is true once it is there, so this loop ends too early, and then never: write while not "
+                return Clue(f"{hint}{code}", source.place(loop), key="waits_while_there")
+    return None
+
+
 @hint_rule(given=_calling, priority=3030)
 def _synchronous_call(case: Case) -> Clue | None:
     """`client.call()` waits for an answer that only a spinning node takes."""
