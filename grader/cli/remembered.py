@@ -82,7 +82,7 @@ class ClassCommand(click.Command):
 
 
 def _taken(last: LastRun, results: Path, params: Mapping[str, click.Option], given: _Texts) -> _Texts:
-    """Return the kept options that are neither given now nor replaced; raises ClassError for one that is no use."""
+    """Return the kept options that are neither given now nor replaced; raises ClassError for an unusable one."""
     from grader.runtime.model.errors import ClassError
 
     by_name = {_name(param): name for name, param in params.items()}

@@ -140,7 +140,7 @@ class Given(NamedTuple):
 def in_vain(given: Given, observations: Sequence[Observation]) -> Iterator[str]:
     """Yield the parameters and remappings that a program was given and that change nothing of its nodes.
 
-    Nothing is said of a program that has failed or has no node: what it would have declared is not known.
+    Those of a program that has failed, or has no node, are left out: what it would have declared is not known.
     """
     program = given.program
     if program.fault is not None or not given.nodes:

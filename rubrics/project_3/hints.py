@@ -157,7 +157,7 @@ _CUTTING = ("split", "rsplit", "partition", "rpartition", "strip", "lstrip", "rs
 
 @hint_rule("reacts_to_responses", outcome=Outcome.NOT_MET, priority=3138)
 def _no_number_cut(case: Case) -> Clue | None:
-    """What is cut out of the response is no number: float raises an exception that the program catches."""
+    """What is cut out of the response is not a number: float raises an exception that the program catches."""
     texts = [str(r.value.get("message", "")) for r in case.trace.of(Response)]
     text = next(filter(None, texts), "")
     for call in case.source.calls("float") if text else ():
@@ -168,7 +168,7 @@ def _no_number_cut(case: Case) -> Clue | None:
             float(part)
         except ValueError:
             code = case.source.code(call, 60)
-            hint = f"{code} gets '{part.strip()[:30]}', which is no number: cut off what is not part of it"
+            hint = f"{code} gets '{part.strip()[:30]}', which is not a number: cut off what is not part of it"
             return Clue(hint, case.source.place(call), key="charge")
     return None
 

@@ -18,7 +18,7 @@ _MOST_BYTES = 1 << 20
 _HEAD = (
     "# How this class is graded. An option that is not given is taken from here: to leave one out, delete its line.\n"
 )
-#: The key of what is no option: the folders and downloads.
+#: The key of the folders and downloads, beside the options.
 _SOURCES = "sources"
 
 

@@ -6,8 +6,8 @@ the host's folder because a sandboxed process sees nothing else of the grader.
 
 The host believes the worker. The worker believes nothing: the program can write to the same socket. So `decoded_report`
 builds each report by the `checked` of its type: a field that is not what it should be is as if it had not been sent,
-and what is no report becomes `NeverSent`. What a field says is not checked here where that takes the submission or the
-plan: that a file has a line, or that a limit explains an end.
+and what is not a report becomes `NeverSent`. What a field says is not checked here where that takes the submission or
+the plan: that a file has a line, or that a limit explains an end.
 
 A new field is written here, and where it is set and read.
 """
@@ -185,7 +185,9 @@ class Progress(NamedTuple):
         NONE  # the first ones of these, sent before anybody could have discovered their publisher
     )
     lost: Mapping[str, int] = NONE  # by channel: how many announced messages did not arrive in time
-    endpoints: Sequence[Claim | None] | None = None  # all that it has, if any changed; checked, None for what is none
+    endpoints: Sequence[Claim | None] | None = (
+        None  # all that it has, if any changed; checked, None for what is invalid
+    )
     sees_graph: bool = False  # with endpoints: whether its program queries the graph
 
     @classmethod
@@ -221,7 +223,7 @@ class WrittenContent(NamedTuple):
 class LaunchedNode(NamedTuple):
     """A node that a launch file describes."""
 
-    package: str = ""  # of its program; empty if the launch file names none
+    package: str = ""  # of its program; empty if the launch file does not say
     near: str = ""  # the package of the submission that this one seems to be a misspelling of
     executable: str = ""
     arguments: Sequence[str] = ()
@@ -324,7 +326,7 @@ class Exited(NamedTuple):
 
 
 class MessagesArrived(NamedTuple):
-    """In virtual time: what `Expect` or `Go` has announced has been received, or has not come in time."""
+    """In virtual time: what `Expect` or `Go` has announced has been received, or has not arrived in time."""
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> "MessagesArrived":

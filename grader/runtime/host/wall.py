@@ -263,7 +263,7 @@ class WallTime:
         originals.kill(os.getpid(), signal.SIGINT)
 
     def progress(self) -> Progress:
-        """Return what is said of the program's progress in the last report: nothing."""
+        """Return what the last report says of the program's progress: nothing."""
         return Progress()
 
 

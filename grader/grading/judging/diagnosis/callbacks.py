@@ -533,7 +533,9 @@ def _bad_name(crash: Crash) -> Clue | None:
     call = _call_at_fault(crash, "create_publisher", "create_subscription")
     # Where the name is written, which may be a constant of the file.
     written = value_of(crash.source, argument(call, 1, "topic")) if call is not None else None
-    return Clue(hint, crash.source.place(written) if written is not None and literal_text(written) is not None else None)
+    return Clue(
+        hint, crash.source.place(written) if written is not None and literal_text(written) is not None else None
+    )
 
 
 @crash_rule("^TypeError|^AttributeError", priority=4130)

@@ -189,7 +189,7 @@ def _counts_by_another_step(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule("field_function", "service_sequence", "log_period", priority=10138)
+@hint_rule(priority=8135)
 def _result_thrown_away(case: Case) -> Clue | None:
     """`self.count + 1` as a statement, for `+=`, or `self.count == 0`, for `=`."""
     for source in case.sources.values():

@@ -420,24 +420,6 @@ def _never_true(unseen: _Unseen) -> Clue | None:
     return None
 
 
-@hint_rule(priority=8135)
-def _compared_for_assigned(case: Case) -> Clue | None:
-    """A statement compares with `==` and does nothing with the result: an assignment was meant."""
-    for source in case.sources.values():
-        for statement in source.all(ast.Expr):
-            test = statement.value
-            if (
-                isinstance(test, ast.Compare)
-                and len(test.ops) == 1
-                and isinstance(test.ops[0], ast.Eq)
-                and chain(test.left)
-            ):
-                code = f"{source.code(test.left, 40)} = {source.code(test.comparators[0], 40)}"
-                hint = f"{source.code(test, 60)} only compares, and does nothing: write {code}"
-                return Clue(hint, source.place(statement))
-    return None
-
-
 @hint_rule(given=_unseen, priority=8140)
 def _kept_in_local(unseen: _Unseen) -> Clue | None:
     """What is logged or published waits for a value that the callback keeps in a local variable."""
