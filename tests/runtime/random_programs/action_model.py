@@ -111,10 +111,9 @@ class ServerModel(WaitableModel):
         self.goals: list[Goal] = []
 
     def requested(self, goal: Goal, future: FutureModel) -> Steps:
-        """Accept a goal, unless its number is negative; rclpy stamps it then."""
+        """Accept a goal, unless its number is negative."""
         accepted = goal.order >= 0
         if accepted:
-            self.process.look()
             goal.status = ACCEPTED
             self.goals.append(goal)
         yield from self.answer("answered", goal, future, int(accepted))

@@ -80,11 +80,9 @@ from program_description import (
 #: something, but after those that another thread has started or woken, which have SimPy's usual priority; then an
 #: executor that looks for work, and a thread whose pause has ended. Then it is the next turn of the first process.
 USUAL, LAST, LOOKING, DUE, TURNS = 1, 2, 3, 4, 10
-#: How late a pause ends in a program that has looked at a clock. Every node has.
+#: How late a pause ends in a program that has looked at a clock, as the event loop of asyncio does. rclpy, which stamps
+#: events of parameters and goals, has not.
 LATE_NS = 1_000
-#: How much later each further look at a clock is within an instant, and how often rclpy looks while it makes a node: it
-#: stamps the events of two parameters, and of the program's own.
-LOOK_NS, LOOKS_OF_A_NODE = 1_000, 3
 #: Every so many messages of a process in a row, all others take what has arrived before the next one is sent.
 FLUSH = 8
 
@@ -160,7 +158,7 @@ class ProcessModel:
         self.world, self.number, self.process = world, number, process
         self.alarms: list[tuple[int, int, simpy.Event]] = []
         self.numbers = count()
-        self.ok, self.ended, self.sent, self.shown = True, False, 0, -LOOK_NS
+        self.ok, self.ended, self.sent = True, False, 0
         #: Whether it has left the graph, so that the middleware sends no response to its clients.
         self.has_left = False
         self.turns: set[int] = set()
@@ -281,16 +279,12 @@ class ProcessModel:
             self.world.succeed(self.news, LOOKING)
             self.news = None
 
-    def look(self) -> int:
-        """Return the time that a look at a clock shows."""
-        self.shown = max(self.world.now, self.shown + LOOK_NS)
-        return self.shown
-
     def end_of(self, pause_ns: int) -> int:
-        """Return when a pause ends: it is counted from the time that was shown last."""
+        """Return when a pause ends."""
         if not pause_ns:
             return self.world.now
-        return max(self.world.now, self.shown) + pause_ns + LATE_NS
+        late_ns = LATE_NS if self.process.spinning is Spinning.ASYNCIO else 0
+        return self.world.now + pause_ns + late_ns
 
     def await_news(self, t_ns: int | None) -> simpy.Event:
         """Return an event for the process's next turn, at the latest at a time."""
@@ -392,9 +386,9 @@ class ProcessModel:
         while left and more:
             if failed is not None:
                 more -= 1
-            elif not ready and resting[0][0] > max(self.world.now, self.shown):
+            elif not ready and resting[0][0] > self.world.now:
                 yield from self.pause(resting[0][0] + LATE_NS)
-            while resting and resting[0][0] <= max(self.world.now, self.shown):
+            while resting and resting[0][0] <= self.world.now:
                 ready.append(heapq.heappop(resting)[2])
             for _ in range(len(ready)):
                 steps = ready.popleft()
@@ -415,7 +409,7 @@ class ProcessModel:
 
     def rest(self, ms: int) -> Steps:
         """Let the event loop of asyncio go on for some time."""
-        yield Resting(max(self.world.now, self.shown) + ms * NS_PER_MS)  # type: ignore[misc]
+        yield Resting(self.world.now + ms * NS_PER_MS)  # type: ignore[misc]
 
     def spin_and_rest(self, executor: Executor) -> Steps:
         while self.ok:
@@ -447,8 +441,6 @@ class NodeModel:
     """A node's entities and variables, and what its callbacks do."""
 
     def __init__(self, process: ProcessModel, node: Node) -> None:
-        for _ in range(LOOKS_OF_A_NODE):
-            process.look()
         self.process, self.world, self.node = process, process.world, node
         self.kept = [0] * max(1, node.slots)
         self.parameter = 0
@@ -621,11 +613,10 @@ class NodeModel:
                 raise AssertionError(one)
 
     def set_parameter(self, number: int) -> Steps:
-        """Ask the callback, and keep the number; rclpy stamps an event of each change."""
+        """Ask the callback, and keep the number."""
         if number >= 0:
             yield from self.process.say(f"parameter {number}")
             self.parameter = number
-            self.process.look()
 
     def publish(self, topic: str, number: int) -> None:
         self.world.expected.topics.setdefault(topic, []).append((self.world.now, number))
