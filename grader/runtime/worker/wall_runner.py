@@ -36,9 +36,9 @@ LONGEST_PAUSE_NS = 10 * NS_PER_MS
 #: The longest delay of the loop before the run counts as invalid: the nodes may have been delayed as long.
 HELD_UP_NS = 150 * NS_PER_MS
 #: An iteration in which the grader works for longer than this, on a graph of hundreds of endpoints for instance, may be
-#: delayed so much for each such piece of work: the processor is taken away repeatedly. A machine that delays a
-#: piece by more than that slows programs down to less than half of their speed.
-PIECE_NS = 100 * NS_PER_MS
+#: delayed so much for each such piece of work. A busy machine takes the processor away after each few milliseconds, so
+#: that a long iteration is delayed many times.
+PIECE_NS = 20 * NS_PER_MS
 #: The most early messages that are distinguished.
 MOST_EARLY = 10_000
 #: How long before its first message a publisher is created, so that subscriptions can discover it.

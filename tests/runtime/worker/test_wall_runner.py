@@ -140,8 +140,6 @@ def test_what_the_nodes_make_the_grader_do_is_no_busy_machine() -> None:
     # Beside other programs the same work is interrupted many times, each time as briefly as ever.
     assert Run(quiet, held_up={300: 600}, work={300: 300}).trace.harness_problem == ""
     assert Run(quiet, held_up={300: 400}, work={300: 1}).trace.harness_problem != ""
-    # Slowed down to a fifteenth, programs are as slow.
-    assert Run(quiet, held_up={300: 300}, work={300: 20}).trace.harness_problem != ""
     assert Run(quiet, held_up={300: 400}, work={100: 300}).trace.harness_problem != ""
 
 
