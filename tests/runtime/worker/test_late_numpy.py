@@ -47,7 +47,7 @@ def test_messages_without_arrays_do_without_it() -> None:
             "import numpy as np\nprint(np.ndarray.__name__, loaded())",
             "from numpy import ndarray\nprint(ndarray.__name__, loaded())",
             "import numpy.linalg, numpy\nprint(numpy.ndarray.__name__, numpy.linalg is sys.modules['numpy.linalg'])",
-            "late_numpy.load()\nprint('ndarray', loaded())",
+            "late_numpy.load_numpy()\nprint('ndarray', loaded())",
         ],
         6,
     ),
