@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from grader.grading.judging.diagnosis.wiring import text_comparisons as text_comparisons
     from grader.grading.judging.diagnosis.wiring import text_in_code as text_in_code
     from grader.grading.judging.diagnosis.wiring import timer_code as timer_code
+    from grader.grading.judging.diagnosis.wiring import unformatted_fields as unformatted_fields
     from grader.grading.judging.facts import LogPaceFacts as LogPaceFacts
     from grader.grading.judging.facts import WrongLogFacts as WrongLogFacts
     from grader.grading.judging.findings import FAULT_KEY as FAULT_KEY
@@ -99,7 +100,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.grading.judging.diagnosis.wiring": (
             "constant_value given_leaf made made_for roots reached runs names_in is_log publish_calls conditions "
             "is_flag timer_code received message_classes number_in_code text_in_code Switch switches text_comparisons "
-            "pauses"
+            "pauses unformatted_fields"
         ),
         "grader.grading.judging.diagnosis.values": "draws",
     },

@@ -122,30 +122,33 @@ class RecordingSession:
                 finished(key, traces[key])
 
         made: dict[Key, list[tuple[NextRecording, Trace]]] = {}
+        wanted: dict[Key, NextRecording] = {}
+
+        def go_on(key: Key) -> None:
+            following = next_recording(made[key], clock, on_wall=on_wall)
+            if isinstance(following, NextRecording):
+                wanted[key] = following
+            else:
+                wanted.pop(key, None)
+                tell(key, following)
+
         for key, job in jobs.items():
             # What no interpreter can run needs no worker.
             if (needless := trace_without_run(job.plan, job.programs)) is not None:
                 tell(key, needless)
             else:
                 made[key] = []
-        while made:
-            wanted = {key: next_recording(so_far, clock, on_wall=on_wall) for key, so_far in made.items()}
-            wave = [(key, want) for key, want in wanted.items() if isinstance(want, NextRecording)]
-            wave = [one for one in wave if one[1].clock != WALL or clock == WALL] or wave[:1]
+                go_on(key)
+        while wanted:
+            wave = [(key, want) for key, want in wanted.items() if want.clock != WALL or clock == WALL]
+            wave = wave or [*wanted.items()][:1]
             again = [
-                Job(
-                    f"{jobs[key].title}{want.title if made[key] else ''}",
-                    want.planned(jobs[key].plan),
-                    budget,
-                )
+                Job(f"{jobs[key].title}{want.title if made[key] else ''}", want.planned(jobs[key].plan), budget)
                 for key, want in wave
             ]
             for (key, want), trace in zip(wave, self.recorder.each(again, progress), strict=True):
                 made[key].append((want, trace))
-                counts = next_recording(made[key], clock, on_wall=on_wall)
-                if isinstance(counts, Trace):
-                    del made[key]
-                    tell(key, counts)
+                go_on(key)
         return {key: traces[key] for key in jobs}
 
     def record_tests(

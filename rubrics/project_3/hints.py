@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
-from contextlib import suppress
 from dataclasses import dataclass
 
 from grader.api import Case, Clue, LogRecord, Outcome, ProblemKind, Response, calls_of, hint_rule
@@ -27,6 +25,7 @@ from grader.api.unstable import (
     subtree,
     switches,
     text_comparisons,
+    unformatted_fields,
 )
 
 
@@ -153,6 +152,9 @@ def _is_number(source: Source, name: ast.Name | ast.Attribute) -> bool:
 
 #: Methods that cut a part out of a text.
 _CUTTING = ("split", "rsplit", "partition", "rpartition", "strip", "lstrip", "rstrip", "replace", "removesuffix")
+#: So many steps back to the message are followed, of texts of so many characters: a program may name a variable by
+#: itself, and make a text longer with each replacement.
+MOST_CUTS, LONGEST = 20, 4_000
 
 
 @hint_rule("reacts_to_responses", outcome=Outcome.NOT_MET, priority=3138)
@@ -173,25 +175,33 @@ def _no_number_cut(case: Case) -> Clue | None:
     return None
 
 
-def _cut_out(node: ast.AST | None, source: Source, text: str) -> object:
+def _cut_out(node: ast.AST | None, source: Source, text: str, left: int = MOST_CUTS) -> object:
     """Return what an expression cuts out of the message of a response; None if that is not plain to see."""
     if isinstance(node, ast.Attribute) and node.attr == "message":
         return text
-    if isinstance(node, ast.Name):
+    if isinstance(node, ast.Name) and left:
         values = [getattr(source.parents.get(n), "value", None) for n in source.stored.get(node.id, ())]
-        return _cut_out(values[0], source, text) if len(values) == 1 else None
-    if isinstance(node, ast.Subscript):
-        whole, place = _cut_out(node.value, source, text), number_in_code(source, node.slice)
+        return _cut_out(values[0], source, text, left - 1) if len(values) == 1 else None
+    if isinstance(node, ast.Subscript) and left:
+        whole, place = _cut_out(node.value, source, text, left - 1), number_in_code(source, node.slice)
         if isinstance(whole, (list, tuple)) and place is not None and -len(whole) <= place < len(whole):
             return whole[int(place)]
-        return None
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _CUTTING:
-        whole, given = _cut_out(node.func.value, source, text), [literal_text(a) for a in node.args]
-        if isinstance(whole, str) and None not in given and "" not in given and not node.keywords:
-            with suppress(TypeError):
-                part: object = getattr(whole, node.func.attr)(*given)
-                return part
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _CUTTING and left:
+        whole = _cut_out(node.func.value, source, text, left - 1)
+        given = [literal_text(one) or "" for one in node.args]
+        if isinstance(whole, str) and "" not in given and not node.keywords:
+            return _called(whole, node.func.attr, given)
     return None
+
+
+def _called(whole: str, method: str, given: list[str]) -> object:
+    """Return what a method of a text returns; None if it does not take these arguments, or the text may become long."""
+    if len(whole) * max(map(len, given), default=1) > LONGEST:
+        return None
+    try:
+        return getattr(whole, method)(*given)
+    except TypeError:
+        return None
 
 
 #: Functions that make an integer of a number.
@@ -426,7 +436,7 @@ def _answer_line(case: Case) -> Clue | None:
     if len(places) != 1:
         return None
     value = getattr(places[0], "value", None)
-    if value is not None and re.search(r"\{[A-Za-z_][^}]*\}", literal_text(value) or ""):
+    if value is not None and unformatted_fields(literal_text(value) or ""):
         hint = f"the f before the string is missing: f{source.code(value, 60)}"
         return Clue(hint, source.place(places[0]), key="unformatted")
     return Clue(f"{source.code(places[0], 60)} does not give such a text as '{example}'", source.place(places[0]))

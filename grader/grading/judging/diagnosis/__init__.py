@@ -28,7 +28,7 @@ from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, clue_flaw, 
 from grader.grading.judging.diagnosis.wiring import bare_statements
 from grader.grading.judging.findings import FAULT_KEY, fault_evidence, fault_hint, fault_sentence
 from grader.grading.judging.source import Source, argument, chain, first_line, last_name, literal_text, read_source
-from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome
+from grader.grading.model.exercise import Criterion, Exercise, Finding, Location, Outcome
 from grader.grading.model.report import Verdict
 from grader.grading.model.wording import quote
 from grader.runtime.model.author_files import AuthorMistake, error_words, line_of
@@ -193,9 +193,10 @@ def hint_for(fault: Fault, trace: Trace, text: str) -> str:
     found = clue_for(Case(criterion, verdict, trace, sources, fault))
     if found is None:
         return fault_hint(fault)
-    place = found[1].location
-    elsewhere = place is not None and (place.file, place.line) != (fault.file, fault.line)
-    return f"{place.file}:{place.line}: {found[1].hint}" if place and elsewhere else found[1].hint
+    hint, place = found[1].hint, found[1].location
+    if place is None or place == Location(fault.file, fault.line):
+        return hint
+    return f"{place.file}:{place.line}: {hint}"
 
 
 @dataclass(frozen=True, slots=True)

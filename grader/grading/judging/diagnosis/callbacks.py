@@ -128,17 +128,13 @@ def _lacks_self(crash: Crash, source: Source) -> Clue | None:
 def _timed_with_message(crash: Crash, source: Source) -> Clue | None:
     found = crash.said(r"(\w+)\(\) missing 1 required positional argument: '(\w+)'")
     functions = source.functions(found[1]) if found else []
-    if (
-        found is None
-        or len(functions) != 1
-        or not any(last_name(m.callback) == found[1] for m in made(source, "timer"))
-    ):
+    timed = [m.callback for m in made(source, "timer") if found is not None and last_name(m.callback) == found[1]]
+    if found is None or len(functions) != 1 or not timed:
         return None
+    given = timed[0]
     if found[2] == "self":
-        given = next(m.callback for m in made(source, "timer") if last_name(m.callback) == found[1])
         code = source.code(given) if given is not None else found[1]
         return Clue(f"{code} is not bound to an object: pass self.{found[1]}", source.place(given or functions[0]))
-    given = next(m.callback for m in made(source, "timer") if last_name(m.callback) == found[1])
     if given is not None and any(last_name(m.callback) == found[1] for m in made(source, "subscription")):
         hint = f"{found[1]} is the callback of the subscription, which passes the message: give the timer a method of "
         return Clue(f"{hint}its own", source.place(given))

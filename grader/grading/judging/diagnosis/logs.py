@@ -31,6 +31,7 @@ from grader.grading.judging.diagnosis.wiring import (
     target_of,
     time_since,
     timer_code,
+    unformatted_fields,
     value_of,
 )
 from grader.grading.judging.facts import LogFacts, LogPaceFacts, WrongLogFacts
@@ -141,8 +142,7 @@ def _nothing_logged(case: Case) -> bool:
     return not student_records(case.trace, case.process)
 
 
-#: A field of an f-string, and a placeholder of `%`, in a text that is logged as it stands.
-_FIELD = re.compile(r"\{(?P<value>[A-Za-z_][\w.]*(?:\(\))?(?:\[[^\]{}]*\])*)(?:![rsa])?(?::[^{}]*)?\}")
+#: A placeholder of `%` in a text that is logged as it stands.
 _PERCENT = re.compile(r"%[-+ 0#]*\d*(?:\.\d+)?[dfgeEsi](?![A-Za-z])")
 
 
@@ -167,8 +167,7 @@ def _text_as_it_stands(case: Case) -> Clue | None:
             hint = f"double braces print one brace: write single ones, in {source.code(call.args[0], 50)}"
             return Clue(hint, source.place(call))
     for call, text in plain:
-        fields = [m["value"] for m in _FIELD.finditer(text)]
-        if fields and text.strip() in written:
+        if unformatted_fields(text) and text.strip() in written:
             return Clue(f"the f before the string is missing: f{source.code(call.args[0], 50)}", source.place(call))
         empty = re.findall(r"\{(?::[^{}]*)?\}", text)
         if empty and text.strip() in written:

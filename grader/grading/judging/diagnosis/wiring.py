@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import TypeGuard
@@ -27,6 +28,8 @@ from grader.runtime.model.dataclass import dataclass
 
 #: Names that stand for names, and operators in operators: a program of the course needs two or three.
 _DEEPEST = 12
+#: A field of an f-string.
+_FIELD = re.compile(r"\{(?P<value>[A-Za-z_][\w.]*(?:\(\))?(?:\[[^\]{}]*\])*)(?:![rsa])?(?::[^{}]*)?\}")
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -719,3 +722,8 @@ def value_of(source: Source, node: ast.AST | None) -> ast.AST | None:
     if isinstance(node, (ast.Name, ast.Attribute)):
         return _only_assignment(source, node) or node
     return node
+
+
+def unformatted_fields(text: str) -> list[str]:
+    """Return the values that a text would show if it were an f-string, as it names them."""
+    return [m["value"] for m in _FIELD.finditer(text)]
