@@ -89,6 +89,14 @@ def test_a_submission_gets_what_it_is_worth(name: str, folder: str) -> None:
     assert {id_: cause for id_, cause in named_causes(report, submission).items() if cause[0] in own} == hinted
 
 
+@pytest.mark.ros
+def test_the_simulation_of_an_author_runs_where_submissions_do() -> None:
+    """In the sandbox, where little of the grader is: its file imports the public interface."""
+    submission = ROOT / "examples" / "obstacle_stop" / "reference"
+    report = grade_until_decided(GradeRequest(str(submission), rubrics=(rubric("obstacle_stop"),), clock="virtual"))
+    assert outcomes(report) == {}
+
+
 def listed_rules(name: str) -> set[str]:
     """Return the hint rules of an example's own."""
     return {rule.id for rule in read_rubric(rubric(name)).hints}

@@ -176,7 +176,7 @@ def worker_view(runtime: PythonRuntime, folder: Path) -> WorkerView:
     package = Path(grader.__file__).resolve().parent
     read = (*runtime.read_paths, runtime.executable, *runtime.library_paths, *runtime.python_paths)
     hidden = tuple(secrets_within(view_of(read).bound, runtime.python_paths))
-    parts = ("__init__.py", "api.py", "runtime")
+    parts = ("__init__.py", "api", "runtime")
     own = tuple(package / name for name in parts)
     return WorkerView(read, hidden, own, (folder,))
 

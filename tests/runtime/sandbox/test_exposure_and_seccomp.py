@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from grader.runtime.ros_installation import find_ros
 from grader.runtime.sandbox import seccomp
-from grader.runtime.sandbox.exposure import parents_of, view_of
+from grader.runtime.sandbox.exposure import parents_of, view_of, worker_view
 
 HEADERS = {
     "x86_64": Path("/usr/include/x86_64-linux-gnu/asm/unistd_64.h"),
@@ -241,3 +242,9 @@ def test_parents_come_before_their_children() -> None:
     """In this order they can be made."""
     folders = parents_of([Path("/a/b/c/d"), Path("/a/x")])
     assert folders == (Path("/a"), Path("/a/b"), Path("/a/b/c"))
+
+
+def test_what_a_worker_has_of_the_grader_is_there(tmp_path: Path) -> None:
+    """A part that has moved would be left out without a word."""
+    own = worker_view(find_ros().runtime, tmp_path).own
+    assert [path for path in own if not path.exists()] == []
