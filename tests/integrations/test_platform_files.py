@@ -172,6 +172,30 @@ def test_what_is_not_ready_is_not_released(release: Path, name: str, old: str, n
     assert said in released("v1.2.0")[1]
 
 
+def test_entries_that_are_not_in_the_changelog_are_not_forgotten(release: Path) -> None:
+    """A release names the first of them, and the command that moves them."""
+    (release / "changes").mkdir()
+    (release / "changes" / "README.md").write_text("One file for each change.\n")
+    (release / "changes" / "other.fixed.md").write_text("Other.\n")
+    assert "found other.fixed.md: run towncrier build --version 1.2.0" in released("v1.2.0")[1]
+
+
+def test_each_entry_stands_in_the_next_release() -> None:
+    """Once, below the heading of its kind; what is named otherwise would be missing."""
+    entries = [
+        path for path in sorted((ROOT / "changes").iterdir()) if path.name not in ("README.md", "template.md.jinja")
+    ]
+    command = [sys.executable, "-m", "towncrier", "build", "--draft", "--version", "9.9.9", "--date", "2026-12-01"]
+    draft = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    kinds = {part.partition("\n")[0].lower(): part.splitlines() for part in draft.split("\n### ")[1:]}
+    for path in entries:
+        text = path.read_text(encoding="utf-8")
+        kind = path.name.split(".")[1]
+        assert text.endswith("\n"), path.name
+        assert text.count("\n") == 1, f"{path.name}: expected one line"
+        assert kinds[kind].count(f"- {text.strip()}") == 1, path.name
+
+
 UNRELEASED_PAGE = """<!-- until the first release -->
 There is no release yet.
 
