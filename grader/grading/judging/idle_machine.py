@@ -1,4 +1,4 @@
-"""Returns what an idle machine may have recorded, given a recording of a busy one on the wall clock; pure."""
+"""Returns what an idle machine may have recorded, given a recording of a busy one; pure."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from grader.runtime.model.trace import (
+    ClockKind,
     Fault,
     GraphSnapshot,
     LogRecord,
@@ -20,7 +21,8 @@ from grader.runtime.model.trace import (
 
 #: On the wall clock, a program that pauses after its work loses the time that it waits for a processor. If it waited
 #: for more than this share of the time, the recording may be another one on an idle machine: at higher speeds, up to
-#: that of a program that did not wait, and earlier. Longer waits count as the longest.
+#: that of a program that did not wait, and earlier. Longer waits count as the longest. Where virtual time counts the
+#: work of the nodes, no share is ordinary: only a busy machine makes one.
 _ORDINARY_WAIT, _LONGEST_WAIT = 0.03, 0.9
 #: The number of speeds, a tenth apart at most, which is less than rubrics allow a rate to be wrong; and of delays.
 _SPEEDS, _DELAYS = 24, 8
@@ -32,7 +34,8 @@ def quicker(trace: Trace) -> Iterator[Trace]:
     A wait makes a program slower all the time, or late by one delay: at its beginning, or with its answers. Whatever
     the chain of threads is from a program to the recording, a delay takes no longer than all of them waited together.
     """
-    if trace.most_starved_ns <= _ORDINARY_WAIT * trace.stop_ns:
+    ordinary = _ORDINARY_WAIT if trace.clock is ClockKind.WALL else 0
+    if trace.most_starved_ns <= ordinary * trace.stop_ns:
         return
     longest_ns = round(_LONGEST_WAIT * trace.stop_ns)
     slower_ns, late_ns = (min(waited, longest_ns) for waited in (trace.most_starved_ns, trace.all_starved_ns))

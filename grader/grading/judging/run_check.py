@@ -83,9 +83,11 @@ def run_check(
     if answer.finding is not None and answer.finding.credit < 1:
         faster = (_judged(criterion, scenario, one, sources).finding for one in quicker(trace))
         if any(finding is not None and finding.credit > answer.finding.credit for finding in faster):
-            waited = f"{span(trace.most_starved_ns)} of {span(trace.stop_ns)}"
-            problem = f"the machine was too busy: the nodes waited {waited} for a processor, which may be the reason"
-            return Answer(problem=problem, suspected=trace.suspected)
+            lost = f"{span(trace.most_starved_ns)} of {span(trace.stop_ns)}"
+            waited = f"the nodes waited {lost} for a processor"
+            worked = f"an idle one may need {lost} less for the nodes' work"
+            problem = f"the machine was too busy: {worked if trace.clock is ClockKind.VIRTUAL else waited}"
+            return Answer(problem=f"{problem}, which may be the reason", suspected=trace.suspected)
         at_once = trace.once("first at once", lambda: _with_first_at_once(trace))
         finding = None if at_once is None else _judged(criterion, scenario, at_once, sources).finding
         if finding is not None and finding.credit > answer.finding.credit:

@@ -48,7 +48,7 @@ def must(holds: Callable[[Any], bool], expected: str) -> AfterValidator:
 class Shape(BaseModel):
     """A mapping with fixed keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, loc_by_alias=True, protected_namespaces=())
+    model_config = ConfigDict(extra="forbid", frozen=True, loc_by_alias=True, protected_namespaces=(), defer_build=True)
 
     def built(self) -> Any:
         """Return the value for an exercise that the mapping stands for."""

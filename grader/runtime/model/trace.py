@@ -403,7 +403,8 @@ class Trace:
     starts: tuple[Start, ...] = ()  # how each process was started
     # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
     reached: tuple[str, ...] = ()
-    # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used
+    # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used; in
+    # virtual time, how much less time an idle machine may need for the nodes' work, where that is counted
     most_starved_ns: int = 0
     # How long all threads of the nodes and of the grader's worker together waited for them: nothing is recorded later
     # than that because the machine was busy

@@ -8,7 +8,7 @@ from dataclasses import replace
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import Trace
 from grader.runtime.plan import Plan
-from grader.runtime.supervisor.pace import keeps_pace
+from grader.runtime.supervisor.pace import keeps_pace, slower_share
 
 #: The values of `--clock`: `auto` is virtual time, with the wall clock where virtual time is unsuitable.
 VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
@@ -16,12 +16,12 @@ VIRTUAL, WALL, AUTO = "virtual", "wall", "auto"
 DRIFTS = "the node pauses after its work, so that virtual time would hide how slow it is"
 #: What readers see where the machine was too busy to find out on the wall clock.
 CHARGED_NOTE = "the machine was too busy for the wall clock: the measured time of the nodes' work was counted instead"
-#: The same work takes longer on a busy machine, which shares caches and cores: by up to a third was seen with ten
-#: programs for each processor. A node that keeps its pace if only this share counts may keep it on an idle machine.
-SURE_SHARE = 0.75
+#: The same work takes longer on a busy machine: two threads that share a core get about half of it each, and so do two
+#: virtual machines; caches are shared too. What a node sends if only this share counts, it may send on an idle machine.
+SURE_SHARE = 0.5
 #: How often the work of such a node is counted at most: the fastest is right.
 COUNTED_TIMES = 3
-#: Why the recording is not judged if it remains unclear.
+#: Why the recording is not judged if a node sends something only where a share of its work counts.
 UNCLEAR = "the machine was too busy to tell whether the nodes are fast enough"
 #: Nodes that waited for a processor for more than this share of the time are slower than on an idle machine, on which
 #: they wait for less than 1 %.
@@ -113,7 +113,8 @@ def _counted(  # noqa: PLR0911  as above
     """Return the same where the machine is too busy for the wall clock: a trace that counts the time of the work.
 
     A node that keeps its pace once is fast enough, because a busy machine makes work slower and never faster. One that
-    does not keep it with `SURE_SHARE` of its work either is too slow anywhere. All between remains unclear.
+    does not keep it with `SURE_SHARE` of its work either is too slow anywhere. How much faster an idle machine may be
+    is then told as time that was waited, so that no point is lost for what this may explain.
 
     Args:
         plain: The recording in virtual time.
@@ -129,14 +130,16 @@ def _counted(  # noqa: PLR0911  as above
     noted = replace(last, notes=(*last.notes, CHARGED_NOTE))
     if keeps_pace(plain, last):
         return noted
-    if len(counted) == 1:
-        if surely is None:
-            return SURELY_COUNTED
-        if not surely.harness_problem and not keeps_pace(plain, surely):
-            return noted
-    if len(counted) < COUNTED_TIMES:
+    if surely is None:
+        return SURELY_COUNTED
+    is_sure = not surely.harness_problem and not keeps_pace(plain, surely)
+    if not is_sure and len(counted) < COUNTED_TIMES:
         return COUNTED
-    return replace(wall, harness_problem=wall.harness_problem or UNCLEAR)
+    slower = 1.0 if surely.harness_problem else slower_share(surely, last)
+    if slower == 1:
+        return replace(wall, harness_problem=wall.harness_problem or UNCLEAR)
+    slower_ns = round(slower * last.stop_ns)
+    return replace(noted, most_starved_ns=slower_ns, all_starved_ns=slower_ns)
 
 
 def _was_held_up(trace: Trace) -> bool:

@@ -30,6 +30,19 @@ def keeps_pace(plain: Trace, charged: Trace) -> bool:
     return all(_kept(times, after.get(key, ()), charged.stop_ns) for key, times in before.items())
 
 
+def slower_share(before: Trace, after: Trace) -> float:
+    """Return by what share of its time a recording is slower than another of the same plan, from 0 to 1.
+
+    That of the channel that is slowed down most counts; it is 1 if a channel has nothing at all.
+
+    Args:
+        before: The faster recording.
+        after: The slower one.
+    """
+    fast, slow = _times(before), _times(after)
+    return max((_slowed(times, slow.get(key, ()), after.stop_ns) for key, times in fast.items()), default=0.0)
+
+
 def _times(trace: Trace) -> dict[Key, list[int]]:
     """Return the times of what each node has sent and written, by channel."""
     found: dict[Key, list[int]] = defaultdict(list)
@@ -52,9 +65,22 @@ def _kept(before: Sequence[int], after: Sequence[int], stop_ns: int) -> bool:
         return True
     if not after:
         return False
+    span_ns, later_ns = _spans(before, after, stop_ns)
+    return later_ns <= max(SLOWER * span_ns, LATER_NS)
+
+
+def _slowed(before: Sequence[int], after: Sequence[int], stop_ns: int) -> float:
+    if not after:
+        return 1.0
+    span_ns, later_ns = _spans(before, after, stop_ns)
+    begins_ns = max(0, after[0] - before[0])
+    return max(later_ns / (span_ns + later_ns) if later_ns > 0 else 0.0, begins_ns / stop_ns)
+
+
+def _spans(before: Sequence[int], after: Sequence[int], stop_ns: int) -> tuple[int, int]:
+    """Return from the first to the last event that both have: how long it took, and how much longer the other time."""
     if len(after) < len(before):  # the next one would have come after the end
         after = [*after, max(stop_ns, after[-1])]
     last = min(len(before), len(after)) - 1
     span_ns = before[last] - before[0]
-    later_ns = after[last] - after[0] - span_ns
-    return later_ns <= max(SLOWER * span_ns, LATER_NS)
+    return span_ns, after[last] - after[0] - span_ns

@@ -194,6 +194,20 @@ def test_a_rate_that_a_busy_machine_can_have_lowered_is_undecided(rate: float, s
         )
 
 
+@pytest.mark.parametrize(("rate", "outcome"), [(18.9, "undecided"), (17.0, "not_met"), (19.2, "met")])
+def test_a_rate_that_work_on_a_busy_machine_has_lowered_is_undecided(rate: float, outcome: str) -> None:
+    """Where virtual time counts the work, however little an idle machine may need less for it."""
+    trace = velocity(rate, 10.0).trace(most_starved_ns=round(0.2 * SECOND))
+    asked = criterion("rate", CHECKS["topic_rate"]("/cmd_vel", 20.0, 1.0))
+    given = judge_exercise(exercise(asked), {"alone": trace}, handed_in(FILE))
+    assert outcomes(given) == {"rate": outcome}
+    if outcome == "undecided":
+        assert given.verdicts[0].reason == (
+            "the machine was too busy: an idle one may need 0.2 s of 10.0 s less for the nodes' work, "
+            "which may be the reason"
+        )
+
+
 @dataclass(frozen=True)
 class StartsEarly:
     """An author's own check: the first message comes within half a second."""

@@ -6,7 +6,7 @@ import pytest
 
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
 from grader.runtime.model.trace import ClockKind, LogRecord, Message, Trace
-from grader.runtime.supervisor.pace import SLOWER, keeps_pace
+from grader.runtime.supervisor.pace import SLOWER, keeps_pace, slower_share
 
 STOP_NS = 10 * NS_PER_S
 
@@ -53,3 +53,17 @@ def test_work_of_varying_length_before_each_message_is_not_slower() -> None:
 def test_two_events_have_no_pace() -> None:
     """Whether an answer comes late is judged otherwise."""
     assert keeps_pace(trace([0, NS_PER_S]), trace([0, 2 * NS_PER_S]))
+
+
+def test_how_much_slower_a_recording_is_follows_from_its_slowest_channel() -> None:
+    """By its period or by its beginning; one that is as fast is not slower, and one that is silent is all of it."""
+    before = trace(every(50))
+    assert slower_share(before, before) == 0
+    assert slower_share(before, trace(every(40))) == 0
+    assert slower_share(before, trace(every(62.5))) == pytest.approx(0.2)
+    assert slower_share(before, trace(every(50, first_ms=1000))) == pytest.approx(0.1)
+    assert slower_share(before, trace([])) == 1
+    logs = trace(every(80), logs=True)
+    both = Trace("alone", before.clock, STOP_NS, before.observations + logs.observations)
+    slower = trace(every(100), logs=True).observations
+    assert slower_share(both, Trace("alone", before.clock, STOP_NS, before.observations + slower)) == pytest.approx(0.2)
