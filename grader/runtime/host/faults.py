@@ -159,9 +159,7 @@ GRADERS = "grader"
 _HOST = os.path.join(os.path.dirname(os.path.abspath(__file__)), "")
 #: Modules that find and run the student's file, or do the work of a module of the standard library: what a function
 #: raises that they call is an answer to the student's code.
-_FOR_STUDENTS = frozenset(
-    {"entry", "launch_files", "launch_shares", "machine", "outside", "packages", "quick_imports", "replaced"}
-)
+_FOR_STUDENTS = frozenset({"entry", "launch", "machine", "outside", "packages", "quick_imports", "replaced"})
 _FOR_STUDENTS |= {"setup_files", "shadows", "threads", "times"}
 #: What a limit or the end of the process raises, wherever it is at that moment.
 _ANYWHERE = (MemoryError, RecursionError, OSError)

@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from . import closures, entry, launch_files, machine, originals
+from . import closures, entry, machine, originals
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_events
@@ -182,6 +182,9 @@ def evaluate(request: dict[str, Any]) -> None:
         request: As for `run`, with `launch`: its `arguments`, the `provided` files of the rubric, name and folder of
             the submission's `packages`, outermost first, and how much is described at `most`; see `describe`.
     """
+    # Here, because processes that run nodes do without; before the submission's folders are searched for modules.
+    from .launch.evaluation import describe
+
     IMPORTS.end()  # a launch file has modules of the grader in place of those that it imports
     machine.install(request["root"])
     link, describer = Link(), Describer()
@@ -206,7 +209,7 @@ def evaluate(request: dict[str, Any]) -> None:
         arguments = dict(told["arguments"])
         describer.hide(installed)
         folders = (root, own)
-        nodes, left_out = launch_files.describe(folders, path, packages, arguments, prefix=installed, **told["most"])
+        nodes, left_out = describe(folders, path, packages, arguments, prefix=installed, **told["most"])
         found = LaunchReport(nodes, left_out)
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = LaunchReport(fault=describer.exception(error))

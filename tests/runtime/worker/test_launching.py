@@ -182,7 +182,7 @@ def test_a_command_for_one_topic_explains_no_other(
     assert outcomes(report)["heard"] == expected
 
 
-BREAKS = "import sys\nsys.modules['_grader_host.launch_files'].DEEPEST = None\n"
+BREAKS = "import sys\nsys.modules['_grader_host.launch.files'].DEEPEST = None\n"
 
 
 @pytest.mark.long
@@ -193,7 +193,7 @@ def test_a_mistake_of_the_evaluator_costs_no_points(graded: Callable[..., Exerci
     # where nothing is included, nothing fails
     assert outcomes(report) == {**dict.fromkeys(outcomes(report), "undecided"), "faster": "met"}
     assert report.faults == ()
-    said = "the grader's own code failed in the process of robot.launch.py: TypeError, launch_files.py line "
+    said = "the grader's own code failed in the process of robot.launch.py: TypeError, launch/files.py line "
     for verdict in report.verdicts:
         if verdict.outcome is not Outcome.UNDECIDED:
             continue

@@ -7,7 +7,7 @@ from diagnosis_samples import LAUNCH_SLIPS
 
 from grader.grading.judging.diagnosis import RULES, hint_for
 from grader.grading.judging.diagnosis.launch_mistakes import NAMES, TAKES
-from grader.runtime.host import launch_names
+from grader.runtime.host.launch import ros_names
 from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
 
 FILE = "robot.launch.py"
@@ -33,9 +33,9 @@ def test_nothing_is_said_of_a_node_that_has_its_own_names() -> None:
 def test_ros_has_every_name_that_is_advised() -> None:
     """The list for hints is a part of that by which launch files are evaluated."""
     for module, names in NAMES.items():
-        assert all(launch_names.has(module, name) for name in names.split()), module
+        assert all(ros_names.has(module, name) for name in names.split()), module
     for name, parameters in TAKES.items():
         module = next(module for module, names in NAMES.items() if name in names.split())
-        signature = launch_names.signature(launch_names.key_of(module, name))
+        signature = ros_names.signature(ros_names.key_of(module, name))
         assert signature is not None
         assert {*signature.parameters} == {*parameters.split()}, name

@@ -14,9 +14,10 @@ from unittest.mock import patch
 
 import pytest
 
-from grader.runtime.host import launch_names
 from grader.runtime.host.faults import Describer
-from grader.runtime.host.launch_files import describe, meant_by
+from grader.runtime.host.launch import ros_classes, ros_modules, ros_names
+from grader.runtime.host.launch.evaluation import describe
+from grader.runtime.host.launch.package_names import meant_by
 from grader.runtime.host.protocol import LaunchedNode, NotEvaluated
 from grader.runtime.worker.notes import left_out_sentence, left_out_words
 
@@ -363,7 +364,7 @@ def test_a_name_of_a_release_whose_names_are_not_known_is_left_out(described: Ca
 
 def test_all_names_of_ros_can_be_imported(described: Callable[..., Described]) -> None:
     """Each from its module: what is not evaluated is there, too."""
-    lines = [f"from {module} import {', '.join(names.split())}" for module, names in launch_names.MODULES.items()]
+    lines = [f"from {module} import {', '.join(names.split())}" for module, names in ros_modules.MODULES.items()]
     nodes, left_out = described("", before="\n".join(lines) + "\n")
     assert (nodes, left_out) == ([], [])
 
@@ -372,12 +373,12 @@ GATHERED = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
 
 
 @pytest.mark.breadth(30, 100)
-@pytest.mark.parametrize("key", launch_names.CLASSES)
+@pytest.mark.parametrize("key", ros_classes.CLASSES)
 def test_a_class_takes_what_that_of_ros_takes(described: Callable[..., Described], key: str) -> None:
     """All required arguments by name; without one, or with another one, it raises what ROS does."""
-    signature = launch_names.signature(key)
+    signature = ros_names.signature(key)
     package, _, name = key.rpartition(".")
-    modules = [one for one, names in launch_names.MODULES.items() if name in names.split() and one.startswith(package)]
+    modules = [one for one, names in ros_modules.MODULES.items() if name in names.split() and one.startswith(package)]
     if signature is None or name.endswith(("Error", "Failure")):
         return
     needed = [
