@@ -160,7 +160,7 @@ def test_commands_do_not_import_the_public_interface() -> None:
 def test_the_members_of_a_check_are_declared_in_one_place() -> None:
     """What the grader asks of a check is a member of the protocol; nothing else is looked up by a literal name."""
     members = {name for name in vars(exercise.Check) if not name.startswith("_")}
-    assert members == {"judge", "roles", "expected", "drawing", "judge_sources", "of_beginning"}
+    assert members == {"judge", "roles", "measures", "expected", "drawing", "judge_sources", "of_beginning"}
     asked: set[str] = set()
     for path in (Path(grader.__file__).parent / "grading" / "judging").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

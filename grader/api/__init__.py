@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from grader.grading.judging.plots import Plot as Plot
     from grader.grading.judging.service_calls import Call as Call
     from grader.grading.judging.service_calls import calls_of as calls_of
-    from grader.grading.judging.values import Reading as Reading
     from grader.grading.judging.values import delivered as delivered
     from grader.grading.judging.values import delivered_numbers as delivered_numbers
     from grader.grading.judging.values import number_at as number_at
@@ -67,6 +66,8 @@ if TYPE_CHECKING:
     from grader.grading.model.exercise import Problem as Problem
     from grader.grading.model.exercise import ProblemKind as ProblemKind
     from grader.grading.model.exercise import Roles as Roles
+    from grader.grading.model.measures import Measure as Measure
+    from grader.grading.model.measures import Reading as Reading
     from grader.grading.model.report import ExerciseReport as ExerciseReport
     from grader.grading.model.report import Report as Report
     from grader.grading.model.report import Summary as Summary
@@ -155,6 +156,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Checks": {
         "grader.grading.model.exercise": "Check Roles NODE_GRAPH Finding Problem ProblemKind Location",
+        "grader.grading.model.measures": "Measure Reading",
         "grader.grading.judging.findings": (
             "met partly not_met explain_fault explain_no_message explain_no_subscription explain_no_server "
             "explain_no_client"
@@ -170,9 +172,7 @@ CONTENTS: dict[str, dict[str, str]] = {
             "Trace Message Delivery LogRecord OutputLine Request Response Fault FaultKind GraphSnapshot Endpoint "
             "ServiceEnd Mark ClockKind"
         ),
-        "grader.grading.judging.values": (
-            "Reading published delivered published_numbers delivered_numbers value_at number_at"
-        ),
+        "grader.grading.judging.values": ("published delivered published_numbers delivered_numbers value_at number_at"),
         "grader.grading.judging.logs.outputs": "student_records printed_lines",
         "grader.grading.judging.service_calls": "Call calls_of",
     },

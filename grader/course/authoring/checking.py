@@ -40,6 +40,8 @@ _ALIKE = 0.8
 
 def oddities(exercise: Exercise, tree: YamlTree) -> list[Mistake]:
     """Return warnings about a rubric, in the order of the file."""
+    again = {id_ for further in exercise.draws.values() for id_ in further}
+    exercise = replace(exercise, scenarios=tuple(s for s in exercise.scenarios if s.id not in again))
     found = list(_of_exercise(exercise, tree))
     for index, criterion in enumerate(exercise.criteria):
         path: TreePath = ("pytest",) if criterion.check_name == TESTED else ("criteria", index)

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from dataclasses import field
 from enum import Enum
 from fractions import Fraction
+from typing import Any
 
 from grader.grading.model.exercise import Outcome
+from grader.grading.model.measures import MEASURED_KEY
 from grader.grading.model.report import ExerciseReport
 from grader.runtime.model.dataclass import dataclass
 
@@ -32,6 +34,8 @@ class TrialResult:
     max_score: Fraction
     outcomes: Mapping[str, Outcome]  # criterion id -> outcome, in rubric order
     reasons: Mapping[str, str]  # criterion id -> reason, of criteria that are not fully met
+    # Criterion id -> its number, limits and share, where the rubric gives a share of the points for a number
+    measured: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def full(self) -> bool:
@@ -58,6 +62,7 @@ def result_of(report: ExerciseReport) -> TrialResult:
         max_score=report.max_score,
         outcomes={verdict.id: verdict.outcome for verdict in report.verdicts},
         reasons={v.id: v.reason for v in report.verdicts if v.outcome is not Outcome.MET},
+        measured={v.id: v.evidence[MEASURED_KEY] for v in report.verdicts if MEASURED_KEY in v.evidence},
     )
 
 
@@ -83,6 +88,19 @@ class Trial:
     def as_expected(self) -> bool:
         """Whether an expected criterion detected it; any criterion if none are expected."""
         return self.fate is Fate.KILLED and (not self.expected or bool(set(self.expected) & set(self.result.turned)))
+
+
+@dataclass(frozen=True, slots=True)
+class Nearest:
+    """How near the best wrong program comes to the reference, by a criterion with a share of the points."""
+
+    criterion: str  # its id
+    name: str  # what is measured
+    unit: str  # its unit; empty if there is none
+    reference: float  # the number of the reference
+    wrong: float | None  # that of the wrong program that loses least by this criterion; None if none loses by it
+    share: float  # the share of the points that this one keeps
+    trial: str  # its id; empty if there is none
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +142,18 @@ class SelftestResult:
         """Criteria that detected no mutant, without an explanation; empty if only some mutants were run."""
         known = {*self.unturned, *(id_ for trial in self.mutants for id_ in trial.result.turned)}
         return tuple(id_ for id_ in self.criteria if id_ not in known) if self.whole else ()
+
+    @property
+    def nearest(self) -> tuple[Nearest, ...]:
+        """How near the best wrong program comes, by each criterion that gives a share of the points for a number."""
+        return tuple(self._nearest(id_, told) for id_, told in self.reference.measured.items())
+
+    def _nearest(self, id_: str, told: Mapping[str, Any]) -> Nearest:
+        wrong = [t for t in self.mutants if id_ in t.result.turned and id_ in t.result.measured]
+        best = max(wrong, key=lambda trial: float(trial.result.measured[id_]["share"]), default=None)
+        found = {} if best is None else best.result.measured[id_]
+        share, trial = found.get("share", 0.0), "" if best is None else best.id
+        return Nearest(id_, told["name"], told["unit"], told["number"], found.get("number"), share, trial)
 
     @property
     def template_fits(self) -> bool:

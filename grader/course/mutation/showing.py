@@ -12,8 +12,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from grader.course.mutation.results import Fate, SelftestResult, Trial, TrialResult
+from grader.course.mutation.results import Fate, Nearest, SelftestResult, Trial, TrialResult
 from grader.grading.model.exercise import Outcome
+from grader.grading.model.measures import Measure
 from grader.grading.model.report import JsonObject
 from grader.grading.reporting.escape import shown, valid_unicode
 
@@ -63,6 +64,8 @@ def _result(console: Console, result: SelftestResult) -> None:
     console.print(_operators(result))
     console.print()
     console.print(_criteria(result))
+    for near in result.nearest:
+        _put(console, 2, _near(near))
     _listed(console, "Survivors, which no criterion detected", result.survivors, _BAD)
     _listed(console, "Correct variants that lost points", result.marked_down, _BAD)
     _listed(console, "Undecided, because the grader or the machine failed", result.undecided, "yellow")
@@ -116,6 +119,16 @@ def _criteria(result: SelftestResult) -> Table:
         row = (len(turned), alone, len(meant), sum(id_ in trial.result.turned for trial in meant))
         table.add_row(id_, *(str(number or "") for number in row), never, style=_BAD if never else "")
     return table
+
+
+def _near(near: Nearest) -> str:
+    """Return how near the best wrong program comes by a criterion, in a line."""
+    measure = Measure(near.name, near.unit)
+    begin = f"{near.criterion}: {shown(near.name)} {shown(measure.written(near.reference))} for the reference"
+    if near.wrong is None:
+        return f"{begin}; no mistake loses points by it"
+    kept = f"{shown(measure.written(near.wrong))} for the best mistake that it marks down, which keeps {near.share:.1%}"
+    return f"{begin}, {kept} of the points: {shown(near.trial, limit=200)}"
 
 
 def _table(first: str, *others: str) -> Table:
@@ -191,6 +204,18 @@ def _as_data(result: SelftestResult) -> JsonObject:
             {"id": id_, "turned_by": sum(id_ in t.result.turned for t in result.mutants)} for id_ in result.criteria
         ],
         "never_turned": list(result.never_turned),
+        "nearest": [
+            {
+                "criterion": near.criterion,
+                "measured": valid_unicode(near.name),
+                "unit": valid_unicode(near.unit),
+                "reference": near.reference,
+                "wrong": near.wrong,
+                "share": near.share,
+                "mutant": valid_unicode(near.trial),
+            }
+            for near in result.nearest
+        ],
         "unturned_because": {id_: valid_unicode(because) for id_, because in result.unturned.items()},
         "mutants": [_trial_data(trial) for trial in result.mutants],
         "variants": [_trial_data(trial) for trial in result.variants],

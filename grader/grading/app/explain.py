@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -11,9 +11,10 @@ from typing import Any, get_args, get_type_hints
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
 from grader.grading.judging.run_check import check_name
-from grader.grading.model.exercise import Criterion, Exercise
+from grader.grading.model.exercise import Criterion, Exercise, measure_of
+from grader.grading.model.measures import COMBINES
 from grader.grading.model.report import CheckExplanation, CheckParameter, CriterionExplanation
-from grader.grading.rubrics.check_parameters import Manual, manual_of
+from grader.grading.rubrics.check_parameters import Manual, manual_of, scale_meanings
 from grader.grading.rubrics.draws import First
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.grading.rubrics.loader import own_checks
@@ -90,13 +91,26 @@ def _criterion(exercise: Exercise, criterion: Criterion) -> CriterionExplanation
         check=name,
         asks=manual.summary,
         details=manual.details,
-        parameters=tuple(_parameter(f, kind, manual, criterion.check) for f in fields(kind)),
+        parameters=(*(_parameter(f, kind, manual, criterion.check) for f in fields(kind)), *_scale(kind, criterion)),
     )
+
+
+def _scale(kind: type, criterion: Criterion | None) -> Iterator[CheckParameter]:
+    """Yield the keys by which a rubric gives a share of the points, of a check that measures a number."""
+    measure = measure_of(kind)
+    if measure is None:
+        return
+    scale = None if criterion is None else criterion.scale
+    limits = {key: "none" if scale is None else measure.written(getattr(scale, key)) for key in ("full", "none")}
+    written = {**limits, "combine": COMBINES[0] if scale is None else scale.combine}
+    for name, meaning in scale_meanings(measure).items():
+        required = measure.required and criterion is None and name in limits
+        yield CheckParameter(name, "" if required else written[name], meaning, required)
 
 
 def _check(name: str, kind: type, used_by: Sequence[str]) -> CheckExplanation:
     manual = manual_of(kind)
-    parameters = tuple(_parameter(f, kind, manual, None) for f in fields(kind))
+    parameters = (*(_parameter(f, kind, manual, None) for f in fields(kind)), *_scale(kind, None))
     return CheckExplanation(name, manual.summary, manual.details, parameters, tuple(used_by))
 
 

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 from grader.grading.judging.logs.outputs import printed_lines
 from grader.grading.judging.texts import clean
-from grader.grading.judging.values import Reading
 from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Point, Series, Stretch, Tone, VerticalLine
+from grader.grading.model.measures import Reading
 from grader.grading.model.wording import first_few, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds, within

@@ -13,6 +13,7 @@ from grader.grading.judging.charts import Lanes, marked_moments, time_chart
 from grader.grading.judging.findings import fault_sentence
 from grader.grading.judging.logs.outputs import printed_lines
 from grader.grading.judging.plots import chart_of, shows_graph
+from grader.grading.judging.proportion import measure_panel
 from grader.grading.judging.recorded_values import recorded_values
 from grader.grading.judging.values import on_student_topic
 from grader.grading.model.chart import (
@@ -27,8 +28,8 @@ from grader.grading.model.chart import (
     Tone,
     VerticalLine,
 )
-from grader.grading.model.exercise import Criterion, Exercise, Location, has_member, reads_sources
-from grader.grading.model.report import ExerciseReport
+from grader.grading.model.exercise import Criterion, Exercise, Location, ask, has_member, measure_of, reads_sources
+from grader.grading.model.report import ExerciseReport, Verdict
 from grader.grading.model.wording import quote
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.quantities import counted, seconds
@@ -49,12 +50,21 @@ def illustrated(
     mistakes: list[AuthorMistake] = []
     return replace(
         report,
-        figures=figures_of(exercise, traces, mistakes),
+        figures=figures_of(on_recordings(exercise, report.verdicts), traces, mistakes, sources),
         excerpts=excerpts_for(report, submission, sources),
         sources=tuple(_whole(f.found, sources[name]) for name, f in files.items() if f.found and name in sources),
         expected={c.id: phrase for c in exercise.criteria if (phrase := expectation(c, mistakes))},
         notes=(*report.notes, *(f"the rubric has a mistake: {mistake}" for mistake in dict.fromkeys(mistakes))),
     )
+
+
+def on_recordings(exercise: Exercise, verdicts: Sequence[Verdict]) -> Exercise:
+    """Return the exercise with each criterion on the recording that decided it, if there are several."""
+    decided = {verdict.id: verdict.recording for verdict in verdicts if verdict.recording}
+    if not decided:
+        return exercise
+    criteria = (replace(c, scenario=decided.get(c.id, c.scenario)) for c in exercise.criteria)
+    return replace(exercise, criteria=tuple(criteria), draws={})
 
 
 def expectation(criterion: Criterion, mistakes: list[AuthorMistake]) -> str:
@@ -74,13 +84,17 @@ def expectation(criterion: Criterion, mistakes: list[AuthorMistake]) -> str:
 
 
 def figures_of(
-    exercise: Exercise, traces: Mapping[str, Trace], mistakes: list[AuthorMistake] | None = None
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    mistakes: list[AuthorMistake] | None = None,
+    sources: Mapping[str, str] | None = None,
 ) -> tuple[Figure, ...]:
     """Return the charts of an exercise in rubric order, the graph if a criterion shows it, then each recording.
 
     Mistakes in the charts of an author's checks are appended to `mistakes`.
     """
-    drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces, [] if mistakes is None else mistakes)]
+    noted: list[AuthorMistake] = [] if mistakes is None else mistakes
+    drawn = [chart for c in exercise.criteria for chart in _drawn(c, traces, noted, sources)]
     figures: list[Figure] = list(_merged(drawn))
     graph = graph_figure(exercise, traces)
     graphs = tuple(c.id for c in exercise.criteria if shows_graph(c.check))
@@ -91,7 +105,12 @@ def figures_of(
     return tuple(replace(f, id=f"{exercise.id}-{number}") for number, f in enumerate(figures, 1))
 
 
-def _drawn(criterion: Criterion, traces: Mapping[str, Trace], mistakes: list[AuthorMistake]) -> Iterable[Chart]:
+def _drawn(
+    criterion: Criterion,
+    traces: Mapping[str, Trace],
+    mistakes: list[AuthorMistake],
+    sources: Mapping[str, str] | None,
+) -> Iterable[Chart]:
     trace = traces.get(criterion.scenario)
     if trace is None:
         return
@@ -103,8 +122,28 @@ def _drawn(criterion: Criterion, traces: Mapping[str, Trace], mistakes: list[Aut
         chart = None
         if is_authored(criterion.check):
             mistakes.append(mistake_of(criterion.check, error))
+    chart = _with_measure(chart, criterion, trace, sources)
     if isinstance(chart, Chart):
         yield replace(chart, scenario=criterion.scenario, criteria=(criterion.id,))
+
+
+def _with_measure(
+    chart: Chart | None, criterion: Criterion, trace: Trace, sources: Mapping[str, str] | None
+) -> Chart | None:
+    """Return the chart with a panel of what the check measured, if the rubric gives a share of the points for it."""
+    measure, scale = measure_of(criterion.check), criterion.scale
+    if measure is None or scale is None or not (chart is None or chart.until_s is not None):
+        return chart
+    try:
+        panel = measure_panel(measure, scale, ask(criterion.check, trace, sources))
+    except Exception:  # judging has reported why the check fails
+        return chart
+    if panel is None:
+        return chart
+    if chart is None:
+        title = f"{measure.name[:1].upper()}{measure.name[1:]}"
+        return time_chart(trace, f"measure {criterion.id}", title, f"{title}, with its limits.", panel)
+    return replace(chart, panels=(*chart.panels, panel))
 
 
 def _merged(charts: Iterable[Chart]) -> Iterable[Chart]:

@@ -10,6 +10,7 @@ from fractions import Fraction
 from grader.grading.judging.facts import OtherEnd
 from grader.grading.judging.values import HIDDEN_TOPICS, student_endpoints
 from grader.grading.model.exercise import Finding, Location, Problem, ProblemKind, exact_share
+from grader.grading.model.measures import Measured
 from grader.grading.model.wording import first_few, moment, nearest, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S, counted, seconds
@@ -35,9 +36,9 @@ LOGGER_HINT = "write through the node's logger: self.get_logger().info(...)"
 AT_ONCE_NS = NS_PER_S
 
 
-def met(reason: str, evidence: Mapping[str, object] | None = None) -> Finding:
-    """Return a finding with full credit."""
-    return Finding(Fraction(1), reason, evidence or {})
+def met(reason: str, evidence: Mapping[str, object] | None = None, *, measured: Measured = ()) -> Finding:
+    """Return a finding with full credit, unless a rubric gives a share of the points for what was measured."""
+    return Finding(Fraction(1), reason, evidence or {}, measured=measured)
 
 
 def partly(  # noqa: PLR0913  each is a field of the finding
@@ -49,10 +50,11 @@ def partly(  # noqa: PLR0913  each is a field of the finding
     problem: Problem | ProblemKind | None = None,
     brief: str = "",
     facts: object = None,
+    measured: Measured = (),
 ) -> Finding:
     """Return a finding with half credit, or with the given share of the points, from 0 to 1."""
-    found = _as_problem(problem)
-    return Finding(exact_share(credit), reason, evidence or {}, hint=hint, problem=found, brief=brief, facts=facts)
+    share, found = exact_share(credit), _as_problem(problem)
+    return Finding(share, reason, evidence or {}, hint=hint, problem=found, brief=brief, facts=facts, measured=measured)
 
 
 def only_printed(reason: str, evidence: Mapping[str, object] | None = None, hint: str = LOGGER_HINT) -> Finding:
@@ -70,8 +72,9 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     problem: Problem | ProblemKind | None = None,
     brief: str = "",
     facts: object = None,
+    measured: Measured = (),
 ) -> Finding:
-    """Return a finding without credit.
+    """Return a finding without credit, unless a rubric gives a share of the points for what was measured.
 
     Args:
         reason: What was found, what was expected.
@@ -82,6 +85,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
         problem: The problem, where a check tells several apart; a fault needs none.
         brief: The reason in a few words, if it is long; for a fault, its own text unless given.
         facts: A record for hint rules.
+        measured: The numbers that were measured all the same, for a rubric with `full` and `none`.
     """
     known = dict(evidence or {})
     if fault is not None:
@@ -89,7 +93,7 @@ def not_met(  # noqa: PLR0913  each is a field of the finding
     location = fault_location(fault) if fault is not None else None
     found = _as_problem(problem)
     brief = brief or (_own_words(fault) if fault is not None else "")
-    return Finding(Fraction(0), reason, known, location, hint, blocked_by, found, brief, facts)
+    return Finding(Fraction(0), reason, known, location, hint, blocked_by, found, brief, facts, measured)
 
 
 def _as_problem(problem: Problem | ProblemKind | None) -> Problem | None:

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from grader.grading.judging.diagnosis import cases_of, clues_for, diagnose, placed, rules_of
 from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, is_asked
-from grader.grading.judging.figures import excerpts_for, illustrated
+from grader.grading.judging.figures import excerpts_for, illustrated, on_recordings
 from grader.grading.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
 from grader.grading.judging.run_check import Answer, check_name, run_check
 from grader.grading.judging.simulations import unheard_by_simulations
@@ -101,7 +101,7 @@ def judge_exercise(
     reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]
     mistakes: list[AuthorMistake] = []
     if sources is not None:
-        cases = cases_of(verdicts, exercise, traces, submission, sources, facts)
+        cases = cases_of(verdicts, on_recordings(exercise, verdicts), traces, submission, sources, facts)
         verdicts = diagnose(verdicts, cases, rules_of(exercise), mistakes) if any(cases) else verdicts
     notes = (f"the rubric has a mistake: {mistake}" for mistake in dict.fromkeys(mistakes))
     return replace(
@@ -133,7 +133,7 @@ def tried_rules(exercise: Exercise, run: Run, mistakes: list[AuthorMistake]) -> 
     """
     traces = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
     verdicts, facts = undiagnosed(exercise, traces, run.submission, run.sources)
-    cases = cases_of(verdicts, exercise, traces, run.submission, run.sources, facts)
+    cases = cases_of(verdicts, on_recordings(exercise, verdicts), traces, run.submission, run.sources, facts)
     rules = rules_of(exercise) if any(cases) else ()
     return tuple(_tried(exercise, case, rules, mistakes) for case in cases if case is not None)
 
@@ -274,6 +274,9 @@ class VerdictBuilder:
         return tuple(self.done[c.id] for c in self.exercise.criteria)
 
     def _verdict(self, criterion: Criterion) -> Verdict:
+        return replace(self._judged(criterion), recording=self.answers[criterion.id].recording)
+
+    def _judged(self, criterion: Criterion) -> Verdict:
         answer = self.answers[criterion.id]
         if answer.missing:
             return self._missing(criterion, answer.missing)

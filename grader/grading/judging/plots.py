@@ -23,7 +23,6 @@ from grader.grading.judging.charts import (
 from grader.grading.judging.recorded_values import parts_of
 from grader.grading.judging.service_calls import Call, calls_of, status_of
 from grader.grading.judging.values import (
-    Reading,
     RuleOrValue,
     as_number,
     as_rule,
@@ -36,6 +35,7 @@ from grader.grading.judging.values import (
 )
 from grader.grading.model.chart import Band, Chart, Level, Look, Panel, Series, Stretch, Tone
 from grader.grading.model.exercise import NODE_GRAPH, has_member, roles_of, texts_under
+from grader.grading.model.measures import Reading
 from grader.grading.model.wording import first_few, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError

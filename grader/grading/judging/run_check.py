@@ -12,6 +12,7 @@ from grader.grading.judging.findings import AT_ONCE_NS, fault_place, faulted, fi
 from grader.grading.judging.idle_machine import quicker
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python, may_differ_by_numpy
 from grader.grading.judging.launched import excuses
+from grader.grading.judging.proportion import in_proportion, over_draws
 from grader.grading.judging.values import student_endpoints
 from grader.grading.model.exercise import Criterion, Exercise, Finding, ask, of_beginning, reads_sources
 from grader.grading.model.wording import quote, span
@@ -43,6 +44,7 @@ class Answer:
         hint: One thing to do about the problem; empty if nothing is very likely right.
         fault: The fault that shows the problem; None if none does.
         suspected: Whether what the submission does may be why there is a problem.
+        recording: Id of the scenario whose recording decided, where a scenario is drawn several times; else empty.
     """
 
     finding: Finding | None = None
@@ -53,6 +55,7 @@ class Answer:
     hint: str = ""
     fault: Fault | None = None
     suspected: bool = False
+    recording: str = ""
 
 
 def check_name(criterion: Criterion) -> str:
@@ -68,7 +71,30 @@ def run_check(
     submission: Submission,
     sources: Mapping[str, str] | None = None,
 ) -> Answer:
-    """Run the criterion's check on the trace of its scenario, or on the source of its files."""
+    """Run the criterion's check on the trace of its scenario, or on the source of its files.
+
+    Of a scenario that is drawn several times, each recording is judged.
+    """
+    ids = exercise.recordings_of(criterion)
+    if len(ids) == 1:
+        return _run_once(criterion, exercise, traces, submission, sources)
+    answers = []
+    for id_ in ids:
+        answers.append(_run_once(replace(criterion, scenario=id_), exercise, traces, submission, sources))
+        if answers[-1].finding is None:  # what could not be judged leaves the criterion undecided
+            return replace(answers[-1], recording=id_)
+    place, finding = over_draws(criterion, [answer.finding for answer in answers if answer.finding is not None])
+    return Answer(finding=finding, recording=ids[place])
+
+
+def _run_once(
+    criterion: Criterion,
+    exercise: Exercise,
+    traces: Mapping[str, Trace],
+    submission: Submission,
+    sources: Mapping[str, str] | None,
+) -> Answer:
+    """Run a check on one recording."""
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     trace = traces.get(scenario.id)
     wanted = scenario.handed_in if trace is None or trace.tested is None else trace.tested.missing
@@ -214,12 +240,20 @@ def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Map
             return _author_mistake(mistake_of(criterion.check, error))
         problem = f"the check {name} failed on this recording through no fault of the submission"
         return Answer(problem=problem, error=f"{type(error).__name__}: {quote(str(error))}")
-    if authored and (wrong := finding_flaw(finding)):
+    if authored and (wrong := finding_flaw(finding) or _unmeasured(criterion, finding)):
         method = "judge_sources" if sources is not None and reads_sources(criterion.check) else "judge"
         return _author_mistake(mistake_in(criterion.check, method, f"the check {name} {wrong}"))
+    finding = in_proportion(criterion, finding)
     if scenario.test is not None:  # the test has decided what ends it
         return Answer(finding=finding)
     return Answer(finding=_start_failure_first(finding, scenario, trace))
+
+
+def _unmeasured(criterion: Criterion, finding: Finding) -> str:
+    """Describe a finding without the number that its criterion needs, as the end of a sentence; empty if it has one."""
+    if criterion.scale is None or not finding.credit or finding.readings:
+        return ""
+    return "gave points and nothing `measured`, which the rubric's `full` and `none` need"
 
 
 def _author_mistake(mistake: AuthorMistake) -> Answer:

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from grader.grading.model.exercise import Check
+from grader.grading.model.measures import Reading
 from grader.grading.model.wording import number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, FieldNumber, Pattern, within
@@ -30,14 +31,6 @@ _NUMERIC_TYPE = re.compile(
 
 #: How many messages or responses are enough to judge the beginning of a recording.
 FEW = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """One number on a topic."""
-
-    t_ns: int
-    value: float
 
 
 @dataclass(frozen=True, slots=True)

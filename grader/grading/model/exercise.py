@@ -11,6 +11,7 @@ from fractions import Fraction
 from numbers import Rational, Real
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 
+from grader.grading.model.measures import Measure, Measured, Reading, Scale, readings_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.trace import Trace
@@ -216,7 +217,7 @@ class Finding:
     """What a check found in a trace.
 
     Raises:
-        TypeError: The credit is not a number.
+        TypeError: The credit is not a number, or something else than numbers was measured.
         ValueError: The credit is not in the range from 0 to 1.
     """
 
@@ -236,10 +237,19 @@ class Finding:
     # nothing.
     # It is not shown in reports, so that a rule and a check can change it together
     facts: object = None
+    # The numbers that the check measures (`Check.measures`), in its unit; infinite for what never came, such as a goal
+    # that was not reached. A rubric with `full` and `none` gives the credit for them in place of `credit`
+    measured: Measured = ()
 
     def __post_init__(self) -> None:
         """Make the credit a fraction, here and not later, so that the traceback shows the author's line."""
         object.__setattr__(self, "credit", exact_share(self.credit))
+        readings_of(self.measured)
+
+    @property
+    def readings(self) -> tuple[Reading, ...]:
+        """What was measured, one reading for each number."""
+        return readings_of(self.measured)
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,6 +293,8 @@ class Check(Protocol):
     if not TYPE_CHECKING:  # for type checkers, every member of a protocol is required
         #: What the parameters are, for charts and for hint rules.
         roles: ClassVar[Roles] = Roles()
+        #: What it measures, if a rubric may give a share of the points for a number: `full` and `none`.
+        measures: ClassVar[Measure | None] = None
 
         @property
         def expected(self) -> str:
@@ -353,6 +365,12 @@ def roles_of(kind: type) -> Roles:
     return declared if isinstance(declared, Roles) else Roles()
 
 
+def measure_of(check: object) -> Measure | None:
+    """Return what a check, or a class of checks, measures; None if it measures nothing."""
+    declared: object = getattr(check, "measures", None)
+    return declared if isinstance(declared, Measure) else None
+
+
 def texts_under(check: object, *parameters: str) -> tuple[str, ...]:
     """Return the texts that a check holds under the names of parameters, without duplicates and empty ones."""
     found = (getattr(check, name, None) for name in parameters)
@@ -374,6 +392,7 @@ class Criterion:
     chapter: str = ""
     feedback: Feedback = OPEN  # how much of its result a student sees
     check_name: str = field(default="", compare=False)  # name of its check in the rubric
+    scale: Scale | None = None  # which numbers of the check earn which share of the points; None if it is met or not
 
 
 class HintRule(Protocol):
@@ -405,6 +424,12 @@ class Exercise:
     interfaces: tuple[str, ...] = ()  # paths of the folders with interface packages that the rubric brings
     bonus: Fraction = Fraction(0)  # points above the maximum that an instructor may give
     hints: Iterable[HintRule] = ()  # the rubric's own hint rules, in the order of its files
+    # Scenario id -> ids of the scenarios that repeat it with other drawn values; only of those that are drawn again
+    draws: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def recordings_of(self, criterion: Criterion) -> tuple[str, ...]:
+        """Return the ids of the scenarios that a criterion is judged on: its own, and those that repeat it."""
+        return (criterion.scenario, *self.draws.get(criterion.scenario, ()))
 
 
 def recordings_in(exercise: Exercise) -> tuple[RecordedStream, ...]:

@@ -50,6 +50,8 @@ class Verdict:
     problem: Problem | None = None
     # The reason in a few words, for terminals; empty if the reason itself is short. Not shown in other reports.
     brief: str = ""
+    # Id of the scenario whose recording decided, if its scenario is drawn several times; not shown in reports
+    recording: str = ""
 
     @property
     def suspected(self) -> bool:

@@ -13,7 +13,8 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, 
 from pydantic import AfterValidator, Field, create_model
 from pydantic.config import JsonDict
 
-from grader.grading.model.exercise import roles_of
+from grader.grading.model.exercise import measure_of, roles_of
+from grader.grading.model.measures import COMBINES, Combine, Measure, Scale
 from grader.grading.rubrics.drawing import (
     Calls,
     CallsOrNever,
@@ -59,7 +60,7 @@ from grader.grading.rubrics.types import (
 )
 from grader.grading.rubrics.units import format_quantity
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit
+from grader.runtime.model.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit, seconds
 from grader.runtime.model.scenario import FieldSpec
 from grader.runtime.stimuli import Simulated
 
@@ -107,12 +108,37 @@ _RECURSIVE = {"FieldSpec": FieldSpec}
 #: A name, and its meaning on the same line and the lines below that are indented further.
 _PARAMETER = re.compile(r"^ {4}(\w+): (.*(?:\n(?: {8}.*| *$))*)", re.MULTILINE)
 _HEADING = "Attributes:"
+#: The keys of a check that measures a number, besides its own parameters.
+_SCALE = ("full", "none", "combine")
+#: The form of a number of a measure by its unit.
+_BY_UNIT: Mapping[str, object] = {"s": Duration, "Hz": Frequency}
 
 
 class _Parameters(Shape):
     """The fields of a frozen dataclass."""
 
     made: ClassVar[type]
+
+    @property
+    def scale(self) -> Scale | None:
+        """What the rubric gives for what a check measures; None if it gives no share for a number."""
+        given = {key: getattr(self, _PREFIX + key) for key in _SCALE if _PREFIX + key in self.model_fields_set}
+        measure = measure_of(self.made)
+        if measure is None or not {"full", "none"} <= set(given):
+            return None
+        full, none = (seconds(given[key]) if measure.unit == "s" else float(given[key]) for key in ("full", "none"))
+        return Scale(full, none, given.get("combine", COMBINES[0]))
+
+    def scale_flaw(self) -> tuple[str, str] | None:
+        """Return the key at which the scale is wrong, and what was expected; None if nothing is."""
+        given = [key for key in _SCALE if _PREFIX + key in self.model_fields_set]
+        measure, scale = measure_of(self.made), self.scale
+        if measure is None or not given:
+            return None
+        if scale is None:
+            return given[0], "`full` and `none` together"
+        flaw = scale.flaw(measure)
+        return ("none", flaw) if flaw else None
 
     def built(self) -> object:
         """Return the dataclass, with defaults for what is left out; raises ValueError if it rejects the values."""
@@ -140,7 +166,32 @@ def _parameters(cls: type) -> type[Shape]:
         default = ... if _is_required(field) else None
         accepted = _accepted(hints[field.name], forms.get(field.name, Text))
         fields[f"{_PREFIX}{field.name}"] = (accepted, Field(default, alias=field.name))
-    return _model(cls, cls.__name__, fields)
+    measure = measure_of(cls)
+    return _model(cls, cls.__name__, fields | (_scale_fields(measure, fields) if measure else {}))
+
+
+def _scale_fields(measure: Measure, others: Mapping[str, object]) -> dict[str, Any]:
+    """Return the keys by which a rubric gives a share of the points for a number."""
+    taken = next((key for key in _SCALE if _PREFIX + key in others), None)
+    if taken is not None:
+        raise TypeError(f"a check that measures something has no parameter `{taken}` of its own")
+    form: Any = _BY_UNIT.get(measure.unit, Real)
+    default = ... if measure.required else None
+    texts = scale_meanings(measure)
+    return {
+        **{f"{_PREFIX}{k}": (form, Field(default, alias=k, description=texts[k])) for k in ("full", "none")},
+        f"{_PREFIX}combine": (Combine, Field(None, alias="combine", description=texts["combine"])),
+    }
+
+
+def scale_meanings(measure: Measure) -> dict[str, str]:
+    """Return what the keys of a check that measures something mean, by their names."""
+    name = f"{measure.name} in {measure.unit}" if measure.unit else measure.name
+    return {
+        "full": f"The {name} that earns full points; numbers up to `none` earn a share in proportion.",
+        "none": f"The {name} that earns no points.",
+        "combine": "How several numbers, and several draws, become one: `worst`, `mean` or `median`.",
+    }
 
 
 def _forms(kind: type) -> dict[str, object]:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -82,12 +82,18 @@ from grader.runtime.model.wording import listed, printable
 def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
     """Return the mistakes between the parts of a rubric, each of which is well formed by itself."""
     scenario_ids = [scenario.id for scenario in rubric.scenarios]
+    drawn = [f"{one.id}_draw_{n}" for one in rubric.scenarios for n in range(2, one.draws + 1)]
     criterion_ids = [criterion.id for criterion in rubric.criteria]
     return [
         *_repeated(rubric.files, ("files",), tree),
         *_repeated(rubric.provided, ("provided",), tree),
         *_both(rubric, tree),
         *_repeated(scenario_ids, ("scenarios",), tree, "id"),
+        *(
+            tree.at(("scenarios", n, "id")).mistake(f"expected another id, found `{id_}`, the name of a further draw")
+            for n, id_ in enumerate(scenario_ids)
+            if id_ in drawn
+        ),
         *_repeated(criterion_ids, ("criteria",), tree, "id"),
         *(m for i, scenario in enumerate(rubric.scenarios) for m in _in_scenario(scenario, i, rubric, tree)),
         *(m for i, criterion in enumerate(rubric.criteria) for m in _in_criterion(criterion, i, rubric, tree)),
@@ -391,22 +397,22 @@ def _exercise(
         _refuse(path, mistakes)
     limits = plain_value(rubric.limits)
     rules = brought.hints + hints_of({criterion.check_name for criterion in criteria} - brought.own)
+    own = tuple(_scenario(path, shape, limits, brought.provided) for shape in rubric.scenarios)
+    again = list(_again(own, rubric))
     return Exercise(
         id=rubric.exercise.id,
         number=rubric.exercise.number,
         title=rubric.exercise.title,
         required=rubric.exercise.required,
         files=rubric.files,
-        scenarios=(
-            *(_scenario(path, shape, limits, brought.provided) for shape in rubric.scenarios),
-            *_runs_of_tests(rubric, brought, limits),
-        ),
+        scenarios=(*own, *_runs_of_tests(rubric, brought, limits), *(scenario for _, scenario in again)),
         criteria=criteria,
         digest=digest,
         by_request=rubric.exercise.by_request,
         bonus=rubric.exercise.bonus or Fraction(0),
         interfaces=tuple(str(path.parent / folder) for folder in rubric.interfaces),
         hints=rules if rules.files else (),
+        draws={s.id: found for s in own if (found := tuple(one.id for id_, one in again if id_ == s.id))},
     )
 
 
@@ -550,6 +556,12 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
     """Yield the criteria; if a check rejects its parameters, this becomes a mistake."""
     for index, shape in enumerate(rubric.criteria):
         name, parameters = shape.check.chosen
+        if flaw := parameters.scale_flaw():
+            key, expected = flaw
+            written: Any = tree.data
+            for step in (path := ("criteria", index, "check", name, key)):
+                written = written[step]
+            mistakes.append(tree.at(path).mistake(f"expected {expected}, found {key}: {printable(str(written), 40)}"))
         try:
             check: Check = plain_value(parameters)
         except ValueError as error:
@@ -567,7 +579,16 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
             chapter=" ".join((shape.chapter or "").split()),
             feedback=feedback_of(shape.feedback, feedback_of(rubric.feedback)),
             check_name=name,
+            scale=parameters.scale,
         )
+
+
+def _again(scenarios: Iterable[Scenario], rubric: RubricShape) -> Iterator[tuple[str, Scenario]]:
+    """Yield each scenario once more for each further draw of its values, with the id of the one that it repeats."""
+    times = {shape.id: shape.draws for shape in rubric.scenarios}
+    for scenario in scenarios:
+        for draw in range(2, times.get(scenario.id, 1) + 1):
+            yield scenario.id, replace(scenario, id=f"{scenario.id}_draw_{draw}")
 
 
 def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mapping[str, str]) -> Scenario:

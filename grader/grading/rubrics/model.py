@@ -34,7 +34,9 @@ from grader.grading.rubrics.types import (
     ProvidedFile,
     Shape,
     Text,
+    Whole,
     YesNo,
+    must,
     wrong,
 )
 from grader.grading.rubrics.variants import VariantsField
@@ -174,6 +176,11 @@ class ExerciseShape(Shape):
     bonus: Points | None = Field(default=None, description="points above the maximum that an instructor may give")
 
 
+#: Each draw costs as much as a scenario of its own.
+_MOST_DRAWS = 20
+Draws = Annotated[Whole, must(lambda count: 1 <= count <= _MOST_DRAWS, f"a whole number from 1 to {_MOST_DRAWS}")]
+
+
 class ScenarioShape(Shape):
     """One situation that is recorded once."""
 
@@ -183,6 +190,9 @@ class ScenarioShape(Shape):
     stimuli: tuple[StimulusShape, ...] = ()
     connections: tuple[ConnectionShape, ...] = Field(
         default=(), description="topics on which messages of stimuli are late or lost"
+    )
+    draws: Draws = Field(
+        default=1, description="in how many recordings it is run, each with values drawn anew, 20 at most"
     )
     start: dict[ProgramName, SomeLongTime] = Field(default={}, description="processes that start late")
     run: dict[ProgramName, RunShape] = Field(default={}, description="what processes are given when they are started")

@@ -64,6 +64,38 @@ def test_what_becomes_of_a_mutant(outcomes: tuple[Outcome, Outcome], fate: Fate)
     assert trial_result(*outcomes).fate is fate
 
 
+def told(number: float, share: float) -> dict[str, Any]:
+    """Return what the evidence says of a number."""
+    return {"rate": {"name": "difference from the rate", "unit": "Hz", "number": number, "share": share}}
+
+
+def test_it_says_how_near_the_best_wrong_program_comes() -> None:
+    """By each criterion with a share of the points, among the mutants that it marks down."""
+    reference = replace(trial_result(), measured=told(0.1, 1.0))
+    none = result(reference=reference)
+    assert [(n.criterion, n.wrong, n.trial) for n in none.nearest] == [("rate", None, "")]
+    assert "rate: difference from the rate 0.1 Hz for the reference; no mistake loses points by it" in shown_words(none)
+    outcomes = ((NOT_MET, 5.0, 0.0), (PARTLY, 0.5, 0.9), (PARTLY, 1.0, 0.8), (MET, 0.2, 1.0))
+    mutants = [
+        replace(t, result=replace(t.result, measured=told(number, share)))
+        for k, (outcome, number, share) in enumerate(outcomes, 3)
+        for t in [trial(k, rate=outcome, speed=NOT_MET)]
+    ]
+    found = result(*mutants, reference=reference)
+    (near,) = found.nearest
+    assert (near.reference, near.wrong, near.share, near.trial) == (0.1, 0.5, 0.9, "a.py:4:period:x")
+    words = "0.5 Hz for the best mistake that it marks down, which keeps 90.0% of the points: a.py:4:period:x"
+    assert words in shown_words(found)
+    data = json.loads(selftest_to_json([found]))
+    jsonschema.validate(data, SCHEMA)
+    assert data["rubrics"][0]["nearest"][0]["wrong"] == 0.5
+
+
+def shown_words(of: SelftestResult) -> str:
+    """Return how a result is shown, on one line."""
+    return " ".join(render_selftest([of], width=300, colour=False).split())
+
+
 def test_a_rubric_without_a_known_hole_passes() -> None:
     """Everything was noticed, or the author says why not."""
     assert result(trial(3, because="it is the same")).passed

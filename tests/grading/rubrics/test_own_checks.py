@@ -27,8 +27,10 @@ from grader.course.packaging import Chosen, classroom50
 from grader.grading.app.grade import read_exercises
 from grader.grading.app.request import GradeRequest
 from grader.grading.judging.judge_run import judge_exercise
-from grader.grading.model.exercise import Location, Outcome
+from grader.grading.judging.proportion import in_proportion
+from grader.grading.model.exercise import Criterion, Location, Outcome
 from grader.grading.model.grading_options import GradingOptions
+from grader.grading.model.measures import Scale
 from grader.grading.model.report import Verdict
 from grader.grading.rubrics.loader import RubricMistakes, read_rubric, side_files
 from grader.runtime.model.author_files import run_author_file
@@ -253,12 +255,14 @@ def test_the_examples_on_the_page_about_own_checks_work() -> None:
     """Points in proportion, and a check that names a line of the student's file."""
     page = (ROOT / "docs" / "how-to" / "own-check.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    (proportional,) = (block for block in blocks if block.startswith("@dataclass(frozen=True)\nclass MeanError"))
+    (proportional,) = (block for block in blocks if block.startswith("@dataclass(frozen=True)\nclass AwayFromDock"))
     (sources,) = (block for block in blocks if block.startswith("    def judge_sources"))
     names = "from collections.abc import Mapping\nfrom dataclasses import replace\n"
-    names += "from grader.api import Location, partly\n"
+    names += "from typing import ClassVar\nfrom grader.api import Location, Measure, Reading\n"
     own = run_author_file("_example", "own-check.md", f"{blocks[0]}\n{names}\n\n{proportional}\n{sources}".encode())
-    check = vars(own)["MeanError"]("/goal", full=1.0, none=3.0)
+    check = vars(own)["AwayFromDock"]("/goal")
+    scale = Scale(1.0, 3.0, "mean")
+    criterion = Criterion("away", "", Fraction(1), "alone", check, scale=scale)
 
     def at(*distances: float) -> Trace:
         trace = TraceBuilder("planner.py")
@@ -267,11 +271,14 @@ def test_the_examples_on_the_page_about_own_checks_work() -> None:
             trace.message(second, "/goal", "geometry_msgs/msg/PoseStamped", fields)
         return trace.trace()
 
-    assert [judge(check, at(x, x)).credit for x in (0.5, 1.0, 1.5, 2.7, 3.0)] == [1, 1, 0.75, Fraction(3, 20), 0]
+    shares = [in_proportion(criterion, judge(check, at(x, x))).credit for x in (0.5, 1.0, 1.5, 2.7, 3.0)]
+    assert shares == [1, 1, Fraction(3, 4), Fraction(3, 20), 0]
     assert judge(check, at()).blocked_by == "publishes"
-    assert check.expected == "a mean distance of at most 1 m"
-    found = judge(check, at(2.0), {"planner.py": "import rclpy\nplace = PLACES[0]\n"})
-    assert (found.location, found.credit) == (Location("planner.py", 2), Fraction(1, 2))
+    found = judge(check, at(), {"planner.py": "import rclpy\nplace = PLACES[0]\n"})
+    assert (found.location, found.credit) == (Location("planner.py", 2), 0)
+    (written,) = (block for block in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "full:" in block)
+    parameters = YAML(typ="safe").load(written)["check"]["away_from_dock"]
+    assert parameters == {"topic": "/nav2/goal", "full": 1.0, "none": 3.0, "combine": "mean"}
 
 
 @pytest.mark.long

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, ClassVar
 
 from grader.grading.judging.checks.fields import InRange
@@ -11,6 +12,7 @@ from grader.grading.judging.findings import explain_fault, faulted, first_fault,
 from grader.grading.judging.plots import Drawing, Plot, value_panels
 from grader.grading.judging.values import JITTER_NS, FieldRule, delivered, number_at, value_at
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.measures import Measure, Reading
 from grader.grading.model.wording import moment, number, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -50,6 +52,7 @@ class ReachesGoal:
     """
 
     roles: ClassVar[Roles] = Roles(given=("topic", "goals"))
+    measures: ClassVar[Measure] = Measure("time to a goal", "s")
     topic: Topic
     goals: Topic
     fields: Annotated[Mapping[str, str], FieldOf("topic", values="goals")]
@@ -67,20 +70,32 @@ class ReachesGoal:
         goals = [g for g in self._goals(trace) if g.stop_ns - g.t_ns > self.within]
         if not goals:
             return _cut_short(trace, f"{self.goals}: no goal was observed for {span(self.within)}")
-        wrong = [(goal, flaw) for goal in goals if (flaw := self._flaw(goal, JITTER_NS[trace.clock]))]
+        jitter_ns = JITTER_NS[trace.clock]
+        wrong = [(goal, flaw) for goal in goals if (flaw := self._flaw(goal, jitter_ns))]
+        measured = [Reading(goal.t_ns, self._took_s(goal, jitter_ns)) for goal in goals]
         nearest = [min(g.distances) for g in goals]
         evidence: dict[str, object] = {"goals": len(goals), "missed": len(wrong), "nearest": nearest[:10]}
         if not wrong:
             ends = number(max(g.distances[-1] for g in goals))
             reason = f"{self.topic}: reached {counted(len(goals), 'goal')} within {span(self.within)}"
-            return met(f"{reason}, at the end at most {ends} away", evidence)
+            return met(f"{reason}, at the end at most {ends} away", evidence, measured=measured)
         reason = f"{self.topic}: {wrong[0][1]}; missed {len(wrong)} of {counted(len(goals), 'goal')}"
         fault = first_fault(trace)
         if fault is not None:
-            return faulted(fault, reason, evidence, last=True)
-        return not_met(
-            reason, evidence | {"first_missed_s": seconds(wrong[0][0].t_ns)}, problem=ProblemKind.WRONG_VALUE
-        )
+            return replace(faulted(fault, reason, evidence, last=True), measured=measured)
+        known = evidence | {"first_missed_s": seconds(wrong[0][0].t_ns)}
+        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE, measured=measured)
+
+    def _took_s(self, goal: _Goal, jitter_ns: int) -> float:
+        """Return how long the robot took to a goal, to stay if it has to; infinite if it missed it."""
+        if self._flaw(goal, jitter_ns):
+            return math.inf
+        near = [(s.t_ns, d <= self.tolerance + _EDGE) for s, d in zip(goal.states, goal.distances, strict=True)]
+        arrived = next(t_ns for t_ns, is_near in near if is_near)
+        if self.stays:
+            left = max((k for k, (_, is_near) in enumerate(near) if not is_near), default=-1)
+            arrived = near[left + 1][0] if left + 1 < len(near) else arrived
+        return seconds(arrived - goal.t_ns)
 
     def _goals(self, trace: Trace) -> list[_Goal]:
         states = delivered(trace, self.topic)

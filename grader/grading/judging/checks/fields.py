@@ -18,7 +18,6 @@ from grader.grading.judging.values import (
     JITTER_NS,
     FewSuffice,
     FieldRule,
-    Reading,
     RuleOrValue,
     as_number,
     as_rule,
@@ -32,6 +31,7 @@ from grader.grading.judging.values import (
 )
 from grader.grading.model.chart import Band
 from grader.grading.model.exercise import Finding, Problem, ProblemKind, Roles
+from grader.grading.model.measures import Measure, Reading
 from grader.grading.model.wording import in_unit, moment, number, numbers, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import SLACK, FieldNumber, FieldOf, Formula, Pattern, counted, seconds, within
@@ -143,6 +143,7 @@ class FieldEqual(FewSuffice, EqualFields):
 class InRange:
     """A question about numbers that lie in a range."""
 
+    measures: ClassVar[Measure] = Measure("distance from the range")
     topic: str
     low: FieldNumber | None = None
     high: FieldNumber | None = None
@@ -165,12 +166,13 @@ class InRange:
         each = [(m, self.numbers(m.value)) for m in messages]
         outside = [(m, bad[0]) for m, values in each if (bad := [v for v in values if not self.rule.allows(v)])]
         every = [v for _, values in each for v in values]
+        measured = [Reading(m.t_ns, max(map(self._outside_by, values))) for m, values in each if values]
         evidence: dict[str, object] = {"messages": len(each), "outside": len(outside)}
         evidence |= {"min": min(every), "max": max(every)} if every else {}
         if not outside:
             seen = f"from {number(min(every))} to {number(max(every))}" if every else "without numbers"
             reason = f"{self.topic}: {self.field} {seen} in {counted(len(each), 'message')}"
-            return met(f"{reason}, expected {self.rule.wanted}", evidence)
+            return met(f"{reason}, expected {self.rule.wanted}", evidence, measured=measured)
         message, value = outside[0]
         reason = f"{moment(message.t_ns)}, {self.topic}: {self.field} is {number(value)}, expected {self.rule.wanted}; "
         reason += f"outside in {len(outside)} of {counted(len(each), 'message')}"
@@ -178,7 +180,14 @@ class InRange:
         # A crash after the first wrong number does not explain it.
         if fault is not None and fault.t_ns <= message.t_ns:
             return faulted(fault, reason, known, last=True)
-        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE)
+        return not_met(reason, known, problem=ProblemKind.WRONG_VALUE, measured=measured)
+
+    def _outside_by(self, value: float) -> float:
+        """Return how far a number is outside the range; 0 inside."""
+        if self.rule.allows(value):
+            return 0.0
+        edges = (edge for edge in (self.low, self.high) if edge is not None)
+        return min((abs(value - edge) for edge in edges), default=0.0)
 
     def drawn(self, messages: Sequence[Message | Delivery]) -> Drawing:
         """Return the number with its range; of a list, the smallest and the largest."""

@@ -30,9 +30,10 @@ from grader.grading.judging.service_calls import (
     settings,
 )
 from grader.grading.judging.source import Source, read_source, subtree
-from grader.grading.judging.values import FieldRule, Reading, as_number, published, shown_value, value_at
+from grader.grading.judging.values import FieldRule, as_number, published, shown_value, value_at
 from grader.grading.model.chart import Look, Panel
 from grader.grading.model.exercise import Finding, Location, ProblemKind, Roles
+from grader.grading.model.measures import Reading
 from grader.grading.model.wording import first_few, moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError

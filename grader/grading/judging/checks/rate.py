@@ -23,6 +23,7 @@ from grader.grading.judging.findings import (
 from grader.grading.judging.values import published
 from grader.grading.model.chart import Band, Chart, Level, Panel, Point, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.measures import Measure
 from grader.grading.model.wording import moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, DurationNs, Hertz, counted, seconds, within
@@ -83,6 +84,7 @@ class TopicRate:
     """
 
     roles: ClassVar[Roles] = Roles(speaks=("topic",))
+    measures: ClassVar[Measure] = Measure("difference from the rate", "Hz")
     topic: str
     rate: Hertz
     tolerance: Hertz
@@ -163,12 +165,13 @@ class TopicRate:
 
     def _grade(self, found: _Measured, evidence: dict[str, object]) -> Finding:
         reason = f"{self.topic}: {found.sentence()}; {self._wanted}"
+        off = abs(found.rate_hz - self.rate)
         if within(found.rate_hz, self.rate, self.tolerance):
-            return met(reason, evidence)
+            return met(reason, evidence, measured=off)
         hint, problem, brief = self._hint(found.rate_hz), ProblemKind.WRONG_RATE, self._brief(found.rate_hz)
         if self.partly_tolerance is not None and within(found.rate_hz, self.rate, self.partly_tolerance):
-            return partly(reason, evidence, hint=hint, problem=problem, brief=brief)
-        return not_met(reason, evidence, hint=hint, problem=problem, brief=brief)
+            return partly(reason, evidence, hint=hint, problem=problem, brief=brief, measured=off)
+        return not_met(reason, evidence, hint=hint, problem=problem, brief=brief, measured=off)
 
     def _brief(self, rate_hz: float, when: str = "") -> str:
         """Return the rate in a few words, with as many decimals as show that it is wrong."""

@@ -30,7 +30,6 @@ from grader.grading.judging.texts import Printed, clean
 from grader.grading.judging.values import (
     JITTER_NS,
     Held,
-    Reading,
     carries_number,
     delivered_numbers,
     heard_from_ns,
@@ -40,6 +39,7 @@ from grader.grading.judging.values import (
 )
 from grader.grading.model.chart import Look, Panel, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.measures import Reading
 from grader.grading.model.wording import moment, number, numbers, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError

@@ -6,13 +6,14 @@ import math
 import statistics
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
 from grader.grading.judging.charts import Lanes, drawn_case, gaps_panel
 from grader.grading.judging.checks.fields import too_few_messages
 from grader.grading.judging.findings import (
+    FAULT_KEY,
     explain_fault,
     explain_no_message,
     explain_no_subscription,
@@ -28,7 +29,6 @@ from grader.grading.judging.values import (
     JITTER_NS,
     FieldRule,
     NoSuchField,
-    Reading,
     RuleOrValue,
     as_number,
     as_rule,
@@ -44,6 +44,7 @@ from grader.grading.judging.values import (
 )
 from grader.grading.model.chart import Band, Level, Stretch, Tone
 from grader.grading.model.exercise import Finding, ProblemKind, Roles
+from grader.grading.model.measures import Measure, Reading
 from grader.grading.model.wording import first_few, moment, number, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
@@ -72,6 +73,7 @@ class Period:
     """
 
     roles: ClassVar[Roles] = Roles(speaks=("topic",))
+    measures: ClassVar[Measure] = Measure("time between two messages", "s")
     topic: str
     least: DurationNs | None = None
     largest: DurationNs | None = None
@@ -93,6 +95,7 @@ class Period:
             return too_few_messages(trace, self.topic, len(times), max(2, self.at_least))
         gaps = [(a, b - a) for a, b in pairwise(times)]
         lengths = [seconds(gap) for _, gap in gaps]
+        measured = [Reading(t_ns, seconds(gap)) for t_ns, gap in gaps]
         evidence = {
             "topic": self.topic,
             "messages": len(times),
@@ -107,11 +110,11 @@ class Period:
         if wrong is not None:
             t_ns, gap = wrong
             reason = f"{moment(t_ns)}, {self.topic}: {seconds(gap):.4g} s to the next message, expected {self.expected}"
-            return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)})
+            return not_met(reason, evidence | {"first_wrong_s": seconds(t_ns)}, measured=measured)
         average = (times[-1] - times[0]) / len(gaps)
         if self.average is not None and not within(average, self.average, self.tolerance * self.average):
-            return not_met(f"{text}; expected {self.expected}", evidence)
-        return met(text, evidence)
+            return not_met(f"{text}; expected {self.expected}", evidence, measured=measured)
+        return met(text, evidence, measured=measured)
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return the time from each message to the next, with what is allowed."""
@@ -154,6 +157,7 @@ class Latency:
     """
 
     roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("output",))
+    measures: ClassVar[Measure] = Measure("time to the next message", "s")
     input: str
     output: str
     within: DurationNs
@@ -177,11 +181,13 @@ class Latency:
         late = [(t, d) for t, d in zip(inputs, delays, strict=True) if d is None or d > self.within + jitter]
         evidence: dict[str, object] = {"inputs": len(inputs), "outputs": len(outputs), "late": len(late)}
         known = [d for d in delays if d is not None]
+        took_s = [math.inf if d is None else seconds(d) for d in delays]
+        measured = list(map(Reading, inputs, took_s))
         evidence["slowest_s"] = seconds(max(known, default=0))
         # The slack is for shares such as 0.9 of 10, which floating point puts above 9.
         if len(inputs) - len(late) >= self.share * len(inputs) - 1e-9:
             reason = f"{self.output}: within {evidence['slowest_s']:.3f} s after {counted(len(inputs), 'input')}"
-            return met(f"{reason} on {self.input}", evidence)
+            return met(f"{reason} on {self.input}", evidence, measured=measured)
         t_ns, delay = late[0]
         took = "nothing" if delay is None else f"a message only after {seconds(delay):.3f} s"
         reason = f"{moment(t_ns)}, {self.output}: {took} after an input on {self.input}, expected one within "
@@ -191,7 +197,7 @@ class Latency:
         if fault is not None and delay is None:
             return faulted(fault, reason, evidence, last=True)
         problem = ProblemKind.NO_ANSWER if delay is None else ProblemKind.TOO_LATE
-        return not_met(reason, evidence | {"first_late_s": seconds(t_ns)}, problem=problem)
+        return not_met(reason, evidence | {"first_late_s": seconds(t_ns)}, problem=problem, measured=measured)
 
     def drawing(self, trace: Trace) -> Drawing:
         """Return inputs and outputs as marks, and the time from each input to the next output."""
@@ -238,6 +244,7 @@ class Silence:
         duration: Length of the window after its grace; up to its end if left out.
     """
 
+    measures: ClassVar[Measure] = Measure("number of messages")
     topic: str
     after: MarkName | None = None
     before: MarkName | None = None
@@ -266,11 +273,12 @@ class Silence:
         window = f"from {seconds(start_ns):.3f} s to {seconds(stop_ns):.3f} s"
         if found:
             reason = f"{self.topic}: {counted(len(found), 'message')} {window}, the first at {moment(found[0])}"
-            return not_met(f"{reason}; expected none", evidence | {"first_s": seconds(found[0])})
+            known = evidence | {"first_s": seconds(found[0])}
+            return not_met(f"{reason}; expected none", known, measured=len(found))
         # Any crash before the end of the window counts: nobody knows what the node would have sent after it.
         if fault is not None and fault.t_ns < stop_ns:
             return faulted(fault, f"the silence {window} earns no points", evidence)
-        return met(f"{self.topic}: no message {window}", evidence)
+        return met(f"{self.topic}: no message {window}", evidence, measured=0)
 
     def _window(self, trace: Trace) -> tuple[int, int] | tuple[None, None]:
         """Return when the window of silence begins and ends; None if the recording has no such moment."""
@@ -390,6 +398,7 @@ class Reaction:
     """
 
     roles: ClassVar[Roles] = Roles(hears=("input",), speaks=("output",))
+    measures: ClassVar[Measure] = Measure("time to the right message", "s")
     input: str
     output: str
     cases: tuple[ReactionCase, ...]
@@ -411,9 +420,20 @@ class Reaction:
             return self._silent(trace)
         wrong = [(a, flaw) for a in asked if (flaw := self._wrong(trace, a))]
         evidence: dict[str, object] = {"inputs": len(asked), "outputs": len(outputs), "wrong": len(wrong)}
+        measured = [Reading(a.given.t_ns, self._took_s(trace, a)) for a in asked if not a.case.silent]
         if wrong:
-            return self._explain(trace, wrong, len(asked), evidence)
-        return met(f"{self.output}: right after each of {counted(len(asked), 'input')} on {self.input}", evidence)
+            found = self._explain(trace, wrong, len(asked), evidence)
+            return found if FAULT_KEY in found.evidence else replace(found, measured=measured)
+        reason = f"{self.output}: right after each of {counted(len(asked), 'input')} on {self.input}"
+        return met(reason, evidence, measured=measured)
+
+    def _took_s(self, trace: Trace, asked: _Asked) -> float:
+        """Return how long the right message took; infinite if it did not come, or another one followed."""
+        if self._wrong(trace, asked):
+            return math.inf
+        rules = asked.case.rules(asked.given.value)
+        first = next(o for o in asked.outputs if not broken_rules(o.value, rules, self.tolerance))
+        return seconds(max(0, first.t_ns - asked.given.t_ns))
 
     def _asked(self, trace: Trace) -> list[_Asked]:
         jitter_ns = JITTER_NS[trace.clock]
