@@ -107,6 +107,23 @@ def test_what_a_document_names_exists(document: str) -> None:
     assert missing(path.read_text(encoding="utf-8"), path.parent) == []
 
 
+#: A row of the table that says where a question is answered: the names that answer it, and the files that have them.
+_ANSWERED = re.compile(r"^\| [^|]*\? [^|]*\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
+_NAME = re.compile(r"[A-Za-z_][\w.]*")
+
+
+def test_what_answers_a_question_is_in_the_files_beside_it() -> None:
+    """In the table of ARCHITECTURE.md; a name that moves takes its row along."""
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    rows = _ANSWERED.findall(text)
+    assert len(rows) > 10
+    for answer, files in rows:
+        found = [path for named in paths(files) for path in ROOT.glob(named.rstrip("/")) if path.is_file()]
+        code = "\n".join(path.read_text(encoding="utf-8") for path in found)
+        names = [name for name in _CODE.findall(answer) if _NAME.fullmatch(name)]
+        assert [name for name in names if not re.search(rf"\b{re.escape(name)}\b", code)] == []
+
+
 def test_what_does_not_exist_is_found() -> None:
     """A link, a path, a path inside a command, one of several, and a pattern that fits nothing."""
     text = (

@@ -1,8 +1,8 @@
 """Decides what happens next in a run in virtual time, and does none of it: it is told events and answers with commands.
 
 It holds the time, the processes and the events that are due. A runner tells it what a process has reported, carries out
-its commands, and keeps everything that touches the world to itself: sockets, ROS, waiting. The section on virtual time
-in ARCHITECTURE.md numbers the rules.
+its commands, and keeps everything that touches the world to itself: sockets, ROS, waiting. The rules are numbered in
+docs/explanation/rules.md.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import pytest
 from places import ROOT
@@ -102,6 +102,29 @@ def sample(shown: Shows = Shows.NOTHING, until: str = BEFORE, clock: ClockKind =
         seed=7357,
         reproduce=Reproduction(("grade", SECRET, "--seed", NUMBER), (("pump", "sha256:" + NUMBER * 16),)),
     )
+
+
+#: Fields of a report that tell nothing which a rubric could withhold; every other one has a secret in `sample`.
+OPEN_FIELDS = {
+    *(f"Report.{name}" for name in ("name", "path", "digest", "environment", "duration_s", "pending", "audience")),
+    *(f"Report.{name}" for name in ("notes", "staff_notes", "interfaces")),
+    *(f"ExerciseReport.{name}" for name in ("id", "number", "title", "required", "clock")),
+    *(f"ExerciseReport.{name}" for name in ("sources", "variant", "starts", "unchecked")),
+    *(f"Verdict.{name}" for name in ("outcome", "score", "max_score", "missing_file", "same_cause_as", "brief")),
+}
+
+
+def test_whoever_adds_a_field_decides_whether_it_is_withheld() -> None:
+    """With a secret in `sample`, which `for_student` has to take out, or with a row in OPEN_FIELDS."""
+    shown = sample()
+    (part,) = shown.exercises
+    secret, every = set[str](), set[str]()
+    for value in (shown, part, *part.verdicts):
+        for one in fields(value):
+            name, told = f"{type(value).__name__}.{one.name}", repr(getattr(value, one.name))
+            every.add(name)
+            secret |= {name} if SECRET in told or NUMBER in told else set()
+    assert every - secret == OPEN_FIELDS
 
 
 @pytest.fixture(autouse=True)

@@ -1,7 +1,7 @@
 """The names below rclpy's documented interface that the grader relies on: each exists in the installed release.
 
 What they do is tested by programs that run on real nodes. This test only tells, in a second and by name, what a new
-release of ROS has renamed. ARCHITECTURE.md lists the same names.
+release of ROS has renamed. docs/explanation/rules.md lists the same names.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ def test_the_tables_hold_what_the_host_takes_and_sends() -> None:
 
 def test_the_names_are_in_the_documents() -> None:
     """Who takes over reads there what a new release may break."""
-    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/explanation/rules.md").read_text(encoding="utf-8")
     names = {name for names in PYTHON.values() for name in names} | set(ASSIGNED) | set(CPP[""])
     known = {"Clock", "ClockType"}  # the bindings of rclpy.clock's own
     assert [name for name in sorted(names - known) if not re.search(rf"\b{name}`", text)] == []

@@ -1,8 +1,8 @@
 """Says what a random program must do, and when: a model of rclpy's executors and of DDS on SimPy.
 
 It reads the description of a program, never its text, and shares no code with the grader. Computing takes no time. What
-happens in one instant follows rclpy where rclpy promises an order, and ARCHITECTURE.md ("What happens at one instant")
-where it does not: processes run one at a time, the first one of the program that has anything to do.
+happens in one instant follows rclpy where rclpy promises an order, and docs/explanation/rules.md ("What happens at one
+instant") where it does not: processes run one at a time, the first one of the program that has anything to do.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The rules of virtual time, as ARCHITECTURE.md numbers them, with a core and a host's clock that touch nothing."""
+"""The rules of virtual time, by their numbers in docs/explanation/rules.md; core and clock touch nothing here."""
 
 from __future__ import annotations
 

@@ -299,14 +299,13 @@ def test_the_others_see_that_a_process_has_left_before_time_goes_on(left: bool) 
 
 # ------------------------------------------------------------------------------ all of them
 
-#: How a rule begins in the section on virtual time.
+#: How a rule begins on its page.
 RULE = re.compile(r"^(\d+)\. ", re.MULTILINE)
 
 
 def numbered_rules(text: str) -> list[int]:
-    """Return the numbers of the rules of virtual time."""
-    _, _, section = text.partition("\n## Virtual time\n")
-    return [int(number) for number in RULE.findall(section.partition("\n## ")[0])]
+    """Return the numbers of the rules of virtual time on their page."""
+    return [int(number) for number in RULE.findall(text)]
 
 
 def marked_rules(source: str) -> Iterator[int]:
@@ -320,7 +319,7 @@ def marked_rules(source: str) -> Iterator[int]:
 
 def test_each_rule_of_virtual_time_has_a_test() -> None:
     """And each mark a rule: whoever adds or moves one is told."""
-    rules = numbered_rules((ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8"))
+    rules = numbered_rules((ROOT / "docs/explanation/rules.md").read_text(encoding="utf-8"))
     assert rules == list(range(1, len(rules) + 1))
     tests = (path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
     assert {rule for text in tests if "mark.rule(" in text for rule in marked_rules(text)} == set(rules)
@@ -328,6 +327,6 @@ def test_each_rule_of_virtual_time_has_a_test() -> None:
 
 def test_a_rule_without_a_test_is_found() -> None:
     """The list and the marks are read as they are written."""
-    assert numbered_rules("\n## Before\n1. x\n## Virtual time\n\n1. a\n   b\n2. c\n\n## After\n3. y\n") == [1, 2]
+    assert numbered_rules("# Rules\n\n1. a\n   b\n2. c\n\n## After\n\nIn 3. y\n") == [1, 2]
     marked = "@pytest.mark.rule(2)\ndef test_x(): ...\n@pytest.mark.rule(3)\ndef helper(): ...\ndef test_y(): ...\n"
     assert list(marked_rules(marked)) == [2]
