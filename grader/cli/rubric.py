@@ -69,7 +69,7 @@ def _schema(*, rubric: Path | None) -> int:
 
 @command.command(name="variant")
 @click.argument("rubric", metavar="FILE", type=RUBRIC)
-@click.option("--variant-key", "key", type=PATH, metavar="FILE", required=True, help="The course key.")
+@click.option("--variant-key", "key", type=PATH, metavar="FILE", required=True, help="The variant key.")
 @click.option("--student", metavar="ID", required=True, help="The student, by the id on the roster.")
 @click.option("--format", "format_", type=click.Choice(["markdown", "json"]), default="markdown", help="Output format.")
 def _variant(*, rubric: Path, key: Path, student: str, format_: str) -> int:

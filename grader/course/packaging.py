@@ -229,7 +229,7 @@ def _check(chosen: Chosen) -> None:
     for path, found in zip(paths, exercises, strict=True):
         if found.variant is not None:
             text = f"{path}: expected a rubric that is the same for everybody, found one with variants"
-            raise RubricError(text, "grade it with grade batch: no platform keeps the course key from students")
+            raise RubricError(text, "grade it with grade batch: no platform keeps the variant key from students")
         if any(scenario.test is not None for scenario in found.scenarios):
             text = (
                 f"{path}: expected a rubric without tests for pytest, which bundles do not bring, found one with some"

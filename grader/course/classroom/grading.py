@@ -292,11 +292,11 @@ def vary(exercises: Sequence[Exercise]) -> bool:
 
 
 def refuse_without_key(course: ClassRequest, exercises: Sequence[Exercise]) -> None:
-    """Raise VariantError or ClassError if exercises have variants and there is no course key or no roster."""
+    """Raise VariantError or ClassError if exercises have variants and there is no variant key or no roster."""
     if not vary(exercises):
         return
     if course.grading.variant_key is None:
-        text = "--variant-key: expected the course key, because a rubric has variants, found none"
+        text = "--variant-key: expected the variant key, because a rubric has variants, found none"
         raise VariantError(text, "name its file with --variant-key FILE")
     if course.roster is None:
         text = "--roster: expected the people of the class, because a rubric has variants, found no roster"
@@ -313,7 +313,7 @@ def own_conditions(
     """Return name of a submission -> the conditions it is graded with, which include its student's variant."""
     if not vary(exercises) or course.grading.variant_key is None:
         return {entry.name: conditions for entry in entries}
-    key = read_key(course.grading.variant_key, "course key")
+    key = read_key(course.grading.variant_key, "variant key")
     found: dict[str, Conditions] = {}
     for entry in entries:
         found[entry.name] = conditions

@@ -56,7 +56,7 @@ def _travelling(options: GradingOptions) -> GradingOptions:
 
 
 def _files(options: GradingOptions) -> Iterator[tuple[bytes, bytes]]:
-    """Yield relative path and content of the files that the options name; the course key is not among them."""
+    """Yield relative path and content of the files that the options name; the variant key is not among them."""
     yield from ((travelling_name(path), _content(path)) for path in options.rubrics)
     yield from checks_of(options.rubrics)
     yield from _definitions(options.interfaces)

@@ -40,7 +40,7 @@ _VARIANT_BYTES = 16
 
 
 def read_key(path: Path, what: str) -> bytes:
-    """Read a key from a file, and strip whitespace; a KeyFileError calls it `what`, such as `course key`."""
+    """Read a key from a file, and strip whitespace; a KeyFileError calls it `what`, such as `variant key`."""
     where = printable(str(path), 500)
     try:
         with path.open("rb") as file:
@@ -121,7 +121,7 @@ def _close_to_others(path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ByKey:
-    """Draws the variant of a student from the course key."""
+    """Draws the variant of a student from the variant key."""
 
     key: bytes
     student: str  # id of the student; case, surrounding whitespace and Unicode normalisation make no difference
@@ -140,8 +140,8 @@ def folded(student: str) -> str:
 
 
 def by_key(path: Path, student: str) -> ByKey:
-    """Read the course key for a student; raises GraderError if the key or the id cannot be used."""
-    return ByKey(read_key(path, "course key"), checked_student(student))
+    """Read the variant key for a student; raises GraderError if the key or the id cannot be used."""
+    return ByKey(read_key(path, "variant key"), checked_student(student))
 
 
 def checked_student(student: str) -> str:

@@ -121,13 +121,13 @@ class GradingOptions:
         commands={GRADE: "", VERIFY: "Use the variant of this student; see --variant-key."},
         kept=True,
     )
-    variant_key: Path | None = _row(  # file with the course key, as the user typed it
+    variant_key: Path | None = _row(  # file with the variant key, as the user typed it
         None,
         "--variant-key",
-        "The course key that rubrics draw variants from.",
+        "The variant key that rubrics draw variants from.",
         kind=OptionKind.PATH,
         metavar="FILE",
-        commands={GRADE: "", BATCH: "The course key; the roster says which variant each student has.", VERIFY: ""},
+        commands={GRADE: "", BATCH: "The variant key; the roster says which variant each student has.", VERIFY: ""},
         kept=True,
     )
     # Recordings to play instead of those of the rubrics: `(name, path)`, where the name is a topic or a message type

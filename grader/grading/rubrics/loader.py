@@ -341,7 +341,7 @@ def _variant(
 ) -> Variant:
     """Return the drawn values; raises RubricError if no student is given, or a value is not known."""
     if draw is None:
-        hint = "name the student and the course key: --student ID --variant-key FILE"
+        hint = "name the student and the variant key: --student ID --variant-key FILE"
         text = "expected a student, because this rubric has variants, found none"
         _refuse(path, [tree.keys[("variants",)].mistake(text, hint)])
     values = [(option.name, draw.value(exercise.id, option)) for option in options]

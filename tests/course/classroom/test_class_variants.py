@@ -69,7 +69,7 @@ def test_whose_variant_is_not_clear_is_not_graded(class_: Callable[..., Any]) ->
 
 
 def test_results_stay_until_the_values_change(class_: Callable[..., Any], tmp_path: Path) -> None:
-    """The same command grades nothing again; another course key means other values."""
+    """The same command grades nothing again; another variant key means other values."""
     class_()
     assert class_()[0].graded == 0
     (tmp_path / "course.key").write_text("another course key of enough bytes\n", encoding="utf-8")
@@ -78,7 +78,7 @@ def test_results_stay_until_the_values_change(class_: Callable[..., Any], tmp_pa
 
 def test_without_key_or_roster_nothing_is_graded(class_: Callable[..., Any]) -> None:
     """The message says which of the two is missing."""
-    with pytest.raises(VariantError, match="--variant-key: expected the course key"):
+    with pytest.raises(VariantError, match="--variant-key: expected the variant key"):
         class_(key="")
     with pytest.raises(ClassError, match="--roster: expected the people of the class"):
         class_(roster="")

@@ -1,4 +1,4 @@
-"""Variants drawn from a course key: reproducible by whoever has key and id, by nobody else, and about evenly."""
+"""Variants drawn from a variant key: reproducible by whoever has key and id, by nobody else, and about evenly."""
 
 import hashlib
 import hmac
@@ -66,7 +66,7 @@ def test_a_key_is_read_without_the_line_break_behind_it(tmp_path: Path) -> None:
     """Editors add one."""
     for name, end in (("a", b""), ("b", b"\n"), ("c", b"\r\n")):
         (tmp_path / name).write_bytes(KEY + end)
-    assert {read_key(tmp_path / name, "course key") for name in "abc"} == {KEY}
+    assert {read_key(tmp_path / name, "variant key") for name in "abc"} == {KEY}
 
 
 @pytest.mark.parametrize(
