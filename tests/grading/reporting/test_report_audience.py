@@ -13,7 +13,7 @@ from report_samples import criterion, endpoint, exercise, hostile, report
 
 from grader.grading.model.chart import Chart, Excerpt, GraphFigure, Panel, Series, Stage
 from grader.grading.model.exercise import Audience, Feedback, Location, Outcome, Problem, ProblemKind, Shows
-from grader.grading.model.report import Report, ReportedFault, Reproduction
+from grader.grading.model.report import ExerciseReport, Report, ReportedFault, Reproduction, Verdict
 from grader.grading.reporting.audience import Readers, for_student, told, withholds
 from grader.grading.reporting.formats import FORMATS, PageLayout, rendered
 from grader.grading.reporting.platforms.classroom50 import COMMIT_DATETIME, VARIABLES
@@ -119,7 +119,8 @@ def test_whoever_adds_a_field_decides_whether_it_is_withheld() -> None:
     shown = sample()
     (part,) = shown.exercises
     secret, every = set[str](), set[str]()
-    for value in (shown, part, *part.verdicts):
+    values: list[Report | ExerciseReport | Verdict] = [shown, part, *part.verdicts]
+    for value in values:
         for one in fields(value):
             name, told = f"{type(value).__name__}.{one.name}", repr(getattr(value, one.name))
             every.add(name)
