@@ -17,6 +17,7 @@ import click
 import pytest
 from cli_samples import a_report
 from click.testing import CliRunner, Result
+from places import ROOT
 from tracing import ODOMETRY
 
 import grader
@@ -24,6 +25,7 @@ from grader.cli import interactive, main
 from grader.grading.app.request import GradeRequest
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import Report
+from grader.grading.rubrics.builtin import builtin_exercises
 from grader.runtime.model import errors
 
 
@@ -551,6 +553,20 @@ def test_help_starts_light() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_grading_by_a_rubric_that_ships_needs_no_reader_of_rubrics() -> None:
+    """Its compiled form does: pydantic and the models of rubrics take longer to import than all that grading needs."""
+    code = (
+        "import sys\nfrom grader.cli import main\n"
+        "try: main.app([sys.argv[1], '--exercise', '1', '--no-progress'])\nexcept SystemExit: pass\n"
+        "print(*sorted({'pydantic', 'grader.grading.rubrics.model'} & set(sys.modules)), file=sys.stderr)"
+    )
+    builtin_exercises()  # so that the compiled form is there
+    command = [sys.executable, "-c", code, str(ROOT / "student_template")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "Exercise 1" in done.stdout
+    assert done.stderr.strip() == ""
 
 
 def test_a_subcommand_is_imported_when_it_is_used() -> None:

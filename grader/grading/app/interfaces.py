@@ -12,6 +12,7 @@ from grader.runtime.interface_packages import FOREVER_S, Provided, built_from, p
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Definition, Submission
 from grader.runtime.model.trace import Delivery, Message, Trace
+from grader.runtime.stimuli import Simulated
 
 if TYPE_CHECKING:
     from grader.grading.rubrics.interfaces import Interfaces
@@ -61,10 +62,12 @@ def provided_for(
 
 def types_in(scenarios: Iterable[Scenario]) -> bytes:
     """Return a text with the types that the simulations of scenarios use."""
+    simulated = [one for scenario in scenarios for one in scenario.stimuli if isinstance(one, Simulated)]
+    if not simulated:
+        return b""
     from grader.grading.rubrics.simulations import offered_by  # noqa: PLC0415 - as above
 
-    stimuli = (stimulus for scenario in scenarios for stimulus in scenario.stimuli)
-    return repr(sorted({name for one in offered_by(stimuli) for name in one.types})).encode()
+    return repr(sorted({name for one in offered_by(simulated) for name in one.types})).encode()
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:
