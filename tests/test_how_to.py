@@ -16,7 +16,8 @@ from places import ROOT
 
 #: Pages in the order in which they are read, in one folder: later ones use what earlier ones leave.
 PAGES = (
-    *("docs/how-to/class.md", "docs/how-to/feedback.md", "docs/how-to/disputed-mark.md", "docs/how-to/moodle.md"),
+    *("docs/how-to/class.md", "docs/how-to/similarity.md", "docs/how-to/feedback.md", "docs/how-to/disputed-mark.md"),
+    "docs/how-to/moodle.md",
     *(
         "docs/reference/evidence.md",
         "docs/reference/formats.md",
