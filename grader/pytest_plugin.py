@@ -175,11 +175,14 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
     For a fixture of a wider scope than a test: `with ros_session.open() as ros: ...`.
     """
     from grader.runtime.model.errors import EnvironmentFault  # noqa: PLC0415 - no other test waits for it
+    from grader.world.measuring import measured_lines  # noqa: PLC0415 - the same
     from grader.world.opening import open_worlds  # noqa: PLC0415 - the same
 
+    has_cov = pytestconfig.pluginmanager.hasplugin("_cov")
+    measured = measured_lines(pytestconfig.invocation_params.dir, combines=has_cov)
     with contextlib.ExitStack() as stack:
         try:
-            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath))
+            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, measured=measured))
         except EnvironmentFault as fault:
             pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
         pytestconfig.stash[_SHARED] = worlds.shared

@@ -130,6 +130,8 @@ class Plan:
         environment: Further variables of the processes.
         begins: What each Python file of the submission starts, by its path, of those that Python can parse.
         connections: The topics on which messages are late or lost.
+        measured: How coverage.py measures the lines of the programs, as JSON; empty if nobody measures them. See
+            `measure_lines` in the host.
     """
 
     scenario: str
@@ -162,6 +164,7 @@ class Plan:
     environment: tuple[tuple[str, str], ...] = ()
     connections: tuple[PlannedConnection, ...] = ()
     begins: tuple[tuple[str, Beginning], ...] = ()
+    measured: str = ""
 
     def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
         """Return the stimuli of a kind."""

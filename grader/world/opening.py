@@ -9,6 +9,7 @@ from pathlib import Path
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.session import OWN_PROGRAMS, RecordingSession, open_session, runs_a_test
+from grader.world.measuring import measured_lines
 from grader.world.world import World
 
 
@@ -19,10 +20,12 @@ class Worlds:
     Attributes:
         session: The workers.
         folder: Where programs are looked for last.
+        measured: How the lines of programs are measured; see `measured_lines`.
     """
 
     session: RecordingSession
     folder: Path
+    measured: str = ""
 
     @property
     def shared(self) -> str:
@@ -53,7 +56,7 @@ class Worlds:
             lose: For such topics, the share of messages that are lost, from 0 to 1.
         """
         folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
-        drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose}
+        drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose, "measured": self.measured}
         world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **drawn)  # type: ignore[arg-type]
         try:
             yield world
@@ -63,11 +66,12 @@ class Worlds:
 
 
 @contextmanager
-def open_worlds(folder: Path) -> Iterator[Worlds]:
+def open_worlds(folder: Path, *, measured: str = "") -> Iterator[Worlds]:
     """Start what worlds run in, and end it at the end of the block.
 
     Args:
         folder: Where programs are looked for last.
+        measured: How the lines of programs are measured; see `measured_lines`.
 
     Raises:
         EnvironmentFault: This machine lacks ROS.
@@ -75,7 +79,7 @@ def open_worlds(folder: Path) -> Iterator[Worlds]:
     if runs_a_test():
         raise EnvironmentFault("a test of a rubric runs programs in no world of its own", "use the fixture `ros`")
     with open_session(OWN_PROGRAMS, workers=1) as session:
-        yield Worlds(session, folder)
+        yield Worlds(session, folder, measured)
 
 
 @contextmanager
@@ -103,7 +107,7 @@ def open_world(
         EnvironmentFault: This machine lacks ROS.
     """
     with (
-        open_worlds(Path()) as worlds,
+        open_worlds(Path(), measured=measured_lines(Path.cwd())) as worlds,
         worlds.open(Path(near), clock=clock, seed=seed, delay=delay, lose=lose) as world,
     ):
         yield world

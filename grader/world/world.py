@@ -176,6 +176,7 @@ class World:
         delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
         lose: For such topics, the share of messages that are lost.
         plan: Limits, clock and folder of the programs; None for programs of one's own, which run where they lie.
+        measured: How coverage.py measures the lines of programs of one's own; empty if nobody measures them.
 
     Attributes:
         session: What the programs run in.
@@ -194,6 +195,7 @@ class World:
         delay: Mapping[str, tuple[float, float]] | None = None,
         lose: Mapping[str, float] | None = None,
         plan: Plan | None = None,
+        measured: str = "",
     ) -> None:
         self.session = session
         self._clock = clock_named(clock)
@@ -213,6 +215,7 @@ class World:
             drawn_order=drawn_order and not self._is_real,
             working=str(Path.cwd()),
             interfaces=_modules_for(self._near[:1]),
+            measured=measured,
         )
         self._plan = replace(plan, connections=tuple(_connections(seed, delay or {}, lose or {})))
         self._observations: list[Observation] = []

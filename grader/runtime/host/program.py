@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from . import closures, entry, machine, originals
+from .covered import measure_lines
 from .faults import Describer
 from .link import Link, Log
 from .outside import install_alarms, install_events
@@ -75,8 +76,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     Args:
         request: `fd` of the socket, `root` and `file` of the submission, `clock` and the share of the work that is
             `charged` to it, `seed` (hex), and whether it decides what runs first of all that is ready (`drawn_order`),
-            whether its files lie `in_place`, `log_format`, `limits`, `steady_ns` of `VirtualTime.start`, and
-            `interfaces`, the folders of interface packages that are not installed.
+            whether its files lie `in_place`, `log_format`, `limits`, `steady_ns` of `VirtualTime.start`,
+            `interfaces`, the folders of interface packages that are not installed, and how its lines are `measured`,
+            None if they are not.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -103,6 +105,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     elif not hidden:  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
+    # After what coverage imports, which is hidden from the program like the modules of the host.
+    time.before_stop = write_lines = measure_lines(request["measured"]) if request["measured"] else lambda: None
     # After the imports of the host: what they draw must not shift what the program draws.
     seed_randomness(request["seed"])
     # A child of the student's would answer on the same socket. On the wall clock it may live, but says nothing; in
@@ -141,6 +145,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     else:
         IMPORTS.hide()
     ending = play(request, describer, link, install_ros)
+    write_lines()  # after exit handlers and before modules are freed, as coverage does
     try:
         ending = clean_up(ending, request["root"], time, watchdog)
     except Exception as error:  # no code of the student runs there that could raise

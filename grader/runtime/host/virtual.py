@@ -97,6 +97,8 @@ class VirtualTime:
         self._charges = False
         #: Called with a reason before the program waits for something outside of virtual time.
         self.give_up_outside: Callable[[str], None] = lambda reason: None
+        #: Called before the stop signal at the end of a recording: the program may be killed soon after it.
+        self.before_stop: Callable[[], None] = lambda: None
 
     def install(self, describe: Callable[[BaseException], FaultReport], report: Callable[[FaultReport], None]) -> None:
         """Make the threads, locks, selectors and clocks of this process virtual.
@@ -292,6 +294,7 @@ class VirtualTime:
         if isinstance(answer, Stop):
             self._stopping = True
             self._end_ns = self.clock.now_ns + STOPPING_NS
+            self.before_stop()
             self._real.kill(os.getpid(), signal.SIGINT)
             return
         self._move_to(answer.now_ns)

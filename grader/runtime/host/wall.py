@@ -77,6 +77,8 @@ class WallTime:
         self._reported: tuple[int, ...] = ()
         self.waited_s = 0.0
         self.domain = 0
+        #: As in `VirtualTime`.
+        self.before_stop: Callable[[], None] = lambda: None
 
     def install_ros(self) -> None:
         """Make every publisher wait for the grader's subscription, so that its first message is recorded."""
@@ -260,6 +262,7 @@ class WallTime:
 
     def _await_stop(self) -> None:
         self._link.next_answer()
+        self.before_stop()
         originals.kill(os.getpid(), signal.SIGINT)
 
     def progress(self) -> Progress:
