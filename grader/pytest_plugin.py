@@ -6,6 +6,7 @@ It is loaded wherever the package is installed, and imports nothing of ROS befor
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import sys
 from collections.abc import Generator, Iterator, Sequence
@@ -49,6 +50,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=int,
         metavar="N",
         help="draw from this seed the order of programs and callbacks that are ready at one instant, delays and losses",
+    )
+    group.addoption(
+        "--ros-debug",
+        action="store_true",
+        help="let breakpoint() in a program that a test starts open the debugger on this terminal; virtual time waits",
     )
 
 
@@ -182,13 +188,28 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
     measured = measured_lines(pytestconfig.invocation_params.dir, combines=has_cov)
     with contextlib.ExitStack() as stack:
         try:
-            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, measured=measured))
+            terminal = _terminal(pytestconfig) if pytestconfig.getoption("--ros-debug") else ""
+            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, measured=measured, terminal=terminal))
         except EnvironmentFault as fault:
             pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
         pytestconfig.stash[_SHARED] = worlds.shared
         if hasattr(pytestconfig, "workeroutput"):  # a process of pytest-xdist, which prints nothing itself
             pytestconfig.workeroutput[_OF_WORKER] = worlds.shared
         yield worlds
+
+
+def _terminal(config: pytest.Config) -> str:
+    """Return the device of the terminal that pytest was started at, which is captured meanwhile."""
+    capture: Any = config.pluginmanager.getplugin("capturemanager")
+    with contextlib.ExitStack() as stack:
+        if capture is not None:
+            capture.suspend(in_=True)
+            stack.callback(capture.resume)
+        for descriptor in range(3):
+            with contextlib.suppress(OSError):
+                return os.ttyname(descriptor)
+    beside = " in a process of pytest-xdist: add -n0" if hasattr(config, "workeroutput") else ""
+    pytest.fail(f"--ros-debug: expected a terminal, found none{beside}", pytrace=False)
 
 
 @pytest.fixture

@@ -21,11 +21,13 @@ class Worlds:
         session: The workers.
         folder: Where programs are looked for last.
         measured: How the lines of programs are measured; see `measured_lines`.
+        terminal: Where a debugger in a program reads and writes; empty for none.
     """
 
     session: RecordingSession
     folder: Path
     measured: str = ""
+    terminal: str = ""
 
     @property
     def shared(self) -> str:
@@ -56,8 +58,10 @@ class Worlds:
             lose: For such topics, the share of messages that are lost, from 0 to 1.
         """
         folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
-        drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose, "measured": self.measured}
-        world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **drawn)  # type: ignore[arg-type]
+        drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose}
+        watched = {"measured": self.measured, "terminal": self.terminal}
+        options = {**drawn, **watched}
+        world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **options)  # type: ignore[arg-type]
         try:
             yield world
             world.finish()
@@ -66,12 +70,13 @@ class Worlds:
 
 
 @contextmanager
-def open_worlds(folder: Path, *, measured: str = "") -> Iterator[Worlds]:
+def open_worlds(folder: Path, *, measured: str = "", terminal: str = "") -> Iterator[Worlds]:
     """Start what worlds run in, and end it at the end of the block.
 
     Args:
         folder: Where programs are looked for last.
         measured: How the lines of programs are measured; see `measured_lines`.
+        terminal: The device of the terminal at which debuggers in programs read and write; empty for none.
 
     Raises:
         EnvironmentFault: This machine lacks ROS.
@@ -79,7 +84,7 @@ def open_worlds(folder: Path, *, measured: str = "") -> Iterator[Worlds]:
     if runs_a_test():
         raise EnvironmentFault("a test of a rubric runs programs in no world of its own", "use the fixture `ros`")
     with open_session(OWN_PROGRAMS, workers=1) as session:
-        yield Worlds(session, folder, measured)
+        yield Worlds(session, folder, measured, terminal)
 
 
 @contextmanager

@@ -77,8 +77,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
         request: `fd` of the socket, `root` and `file` of the submission, `clock` and the share of the work that is
             `charged` to it, `seed` (hex), and whether it decides what runs first of all that is ready (`drawn_order`),
             whether its files lie `in_place`, `log_format`, `limits`, `steady_ns` of `VirtualTime.start`,
-            `interfaces`, the folders of interface packages that are not installed, and how its lines are `measured`,
-            None if they are not.
+            `interfaces`, the folders of interface packages that are not installed, how its lines are `measured`,
+            None if they are not, and the `terminal` of its debugger, empty for none.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -105,6 +105,10 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     elif not hidden:  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
+    if request["terminal"]:
+        from .debugging import debug_at  # with pdb, which no other program needs
+
+        debug_at(request["terminal"], os.path.basename(request["file"]))
     # After what coverage imports, which is hidden from the program like the modules of the host.
     time.before_stop = write_lines = measure_lines(request["measured"]) if request["measured"] else lambda: None
     # After the imports of the host: what they draw must not shift what the program draws.

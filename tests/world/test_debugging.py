@@ -1,0 +1,70 @@
+"""`--ros-debug` opens pdb in a program of a test, at a terminal and through what pytest captures."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pexpect
+import pytest
+
+pytestmark = pytest.mark.ros
+
+NODE = """\
+import rclpy
+from std_msgs.msg import Int32
+
+rclpy.init()
+node = rclpy.create_node("counts")
+out = node.create_publisher(Int32, "/count", 10)
+count = 40
+
+
+def on_timer():
+    global count
+    count += 1
+    if count == 42:
+        breakpoint()
+    out.publish(Int32(data=count))
+
+
+node.create_timer(1.0, on_timer)
+rclpy.spin(node)
+"""
+
+TESTS = """\
+def test_values(ros):
+    ros.run("counts.py")
+    ros.advance(3.0)
+    assert [(one.t, one.message.data) for one in ros.received("/count")] == [(1.0, 41), (2.0, 7), (3.0, 8)]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """Return a folder with a node that stops at a breakpoint, and a test of it."""
+    (tmp_path / "counts.py").write_text(NODE, encoding="utf-8")
+    (tmp_path / "test_it.py").write_text(TESTS, encoding="utf-8")
+    return tmp_path
+
+
+def test_pdb_changes_a_value_while_virtual_time_waits(folder: Path) -> None:
+    """The terminal that pytest was started at is the debugger's, though pytest captures all three streams."""
+    command = [*("-m", "pytest", "-p", "grader.pytest_plugin", "-p", "no:cacheprovider", "--ros-debug", "test_it.py")]
+    # no time-out: the end of the process ends the wait as well
+    with pexpect.spawn(sys.executable, command, cwd=str(folder), timeout=None, encoding="utf-8") as shell:
+        assert shell.expect(["counts.py has stopped, and virtual time with it", pexpect.EOF]) == 0
+        assert shell.expect([r"\(Pdb\) ", pexpect.EOF]) == 0
+        shell.sendline("count")
+        assert shell.expect([r"\r\n42\r\n", pexpect.EOF]) == 0
+        shell.sendline("globals()['count'] = 7")
+        shell.sendline("c")
+        shell.expect(pexpect.EOF)
+        text = shell.before
+    assert "1 passed" in text, text
+
+
+def test_without_a_terminal_it_says_so(folder: Path, pytester: pytest.Pytester) -> None:
+    """Nobody would answer the debugger: the program would read the end of a file, and end with BdbQuit."""
+    arguments = ("-p", "grader.pytest_plugin", "--ros-debug", f"--rootdir={folder}", str(folder))
+    found = pytester.runpytest_subprocess(*arguments)
+    assert "--ros-debug: expected a terminal, found none" in found.stdout.str()
