@@ -56,6 +56,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="let breakpoint() in a program that a test starts open the debugger on this terminal; virtual time waits",
     )
+    group.addoption(
+        "--ros-debug-port",
+        type=int,
+        metavar="PORT",
+        help="let breakpoint() in such a program wait until a debugger has attached itself at this port, as that of "
+        "VS Code; the next programs take the ports after it",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -188,8 +195,8 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
     measured = measured_lines(pytestconfig.invocation_params.dir, combines=has_cov)
     with contextlib.ExitStack() as stack:
         try:
-            terminal = _terminal(pytestconfig) if pytestconfig.getoption("--ros-debug") else ""
-            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, measured=measured, terminal=terminal))
+            debugger = _debugger(pytestconfig)
+            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, measured=measured, debugger=debugger))
         except EnvironmentFault as fault:
             pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
         pytestconfig.stash[_SHARED] = worlds.shared
@@ -198,8 +205,25 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
         yield worlds
 
 
+def _debugger(config: pytest.Config) -> str:
+    """Return where a debugger of programs is; empty if nobody asks for one."""
+    port, at_terminal = config.getoption("--ros-debug-port"), config.getoption("--ros-debug")
+    if port is None and not at_terminal:
+        return ""
+    from grader.world.debuggers import debugger_at  # noqa: PLC0415 - few tests are debugged
+
+    terminal = _terminal(config)
+    if at_terminal and not terminal:
+        beside = " in a process of pytest-xdist: add -n0" if hasattr(config, "workeroutput") else ""
+        pytest.fail(f"--ros-debug: expected a terminal, found none{beside}", pytrace=False)
+    try:
+        return debugger_at(terminal, port)
+    except ImportError as error:
+        pytest.fail(f"--ros-debug-port: {error}: pip install debugpy", pytrace=False)
+
+
 def _terminal(config: pytest.Config) -> str:
-    """Return the device of the terminal that pytest was started at, which is captured meanwhile."""
+    """Return the device of the terminal that pytest was started at, which is captured meanwhile; empty for none."""
     capture: Any = config.pluginmanager.getplugin("capturemanager")
     with contextlib.ExitStack() as stack:
         if capture is not None:
@@ -208,8 +232,7 @@ def _terminal(config: pytest.Config) -> str:
         for descriptor in range(3):
             with contextlib.suppress(OSError):
                 return os.ttyname(descriptor)
-    beside = " in a process of pytest-xdist: add -n0" if hasattr(config, "workeroutput") else ""
-    pytest.fail(f"--ros-debug: expected a terminal, found none{beside}", pytrace=False)
+    return ""
 
 
 @pytest.fixture

@@ -132,8 +132,8 @@ class Plan:
         connections: The topics on which messages are late or lost.
         measured: How coverage.py measures the lines of the programs, as JSON; empty if nobody measures them. See
             `measure_lines` in the host.
-        terminal: Where a debugger in the programs reads and writes, as the path of a device; then nothing ends a
-            program that does not go on. Empty without a debugger.
+        debugger: Where a debugger of the programs is, as JSON; then nothing ends a program that does not go on. Empty
+            without a debugger. See `let_stop` in the host.
     """
 
     scenario: str
@@ -167,7 +167,7 @@ class Plan:
     connections: tuple[PlannedConnection, ...] = ()
     begins: tuple[tuple[str, Beginning], ...] = ()
     measured: str = ""
-    terminal: str = ""
+    debugger: str = ""
 
     def of(self, kind: type[Kind]) -> tuple[Kind, ...]:
         """Return the stimuli of a kind."""

@@ -208,6 +208,7 @@ def open_session(  # noqa: PLR0913  what to open, and where progress goes
     warm: bool = True,
     on_wall_clock: Callable[[], None] = lambda: None,
     executes: bool = False,
+    own_network: bool = True,
 ) -> Iterator[RecordingSession]:
     """Open a recording session, and close it at the end of the block.
 
@@ -218,12 +219,13 @@ def open_session(  # noqa: PLR0913  what to open, and where progress goes
         warm: Whether to start a worker at once, not when something is recorded.
         on_wall_clock: See `Recorder`.
         executes: See `Recorder`.
+        own_network: Whether own programs get a network of their own, if possible.
 
     Raises:
         EnvironmentFault: This machine lacks ROS or the requested tier.
     """
     ros = find_ros(workspaces=isolation == OWN_PROGRAMS)
-    choice = choose_isolation(isolation, Machine(ros), progress)
+    choice = choose_isolation(isolation if own_network else NO_ISOLATION, Machine(ros), progress)
     tier = choice.isolation
     workers = workers or workers_for(len(os.sched_getaffinity(0)))
     # Neither workers nor student processes write byte code, so their modules are compiled here, once.

@@ -21,13 +21,13 @@ class Worlds:
         session: The workers.
         folder: Where programs are looked for last.
         measured: How the lines of programs are measured; see `measured_lines`.
-        terminal: Where a debugger in a program reads and writes; empty for none.
+        debugger: Where a debugger of programs is; see `debugger_at`.
     """
 
     session: RecordingSession
     folder: Path
     measured: str = ""
-    terminal: str = ""
+    debugger: str = ""
 
     @property
     def shared(self) -> str:
@@ -59,7 +59,7 @@ class Worlds:
         """
         folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
         drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose}
-        watched = {"measured": self.measured, "terminal": self.terminal}
+        watched = {"measured": self.measured, "debugger": self.debugger}
         options = {**drawn, **watched}
         world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **options)  # type: ignore[arg-type]
         try:
@@ -70,21 +70,22 @@ class Worlds:
 
 
 @contextmanager
-def open_worlds(folder: Path, *, measured: str = "", terminal: str = "") -> Iterator[Worlds]:
+def open_worlds(folder: Path, *, measured: str = "", debugger: str = "") -> Iterator[Worlds]:
     """Start what worlds run in, and end it at the end of the block.
 
     Args:
         folder: Where programs are looked for last.
         measured: How the lines of programs are measured; see `measured_lines`.
-        terminal: The device of the terminal at which debuggers in programs read and write; empty for none.
+        debugger: Where a debugger of programs is; see `debugger_at`.
 
     Raises:
         EnvironmentFault: This machine lacks ROS.
     """
     if runs_a_test():
         raise EnvironmentFault("a test of a rubric runs programs in no world of its own", "use the fixture `ros`")
-    with open_session(OWN_PROGRAMS, workers=1) as session:
-        yield Worlds(session, folder, measured, terminal)
+    # a debugger that attaches itself is outside, and could not reach a network of the programs' own
+    with open_session(OWN_PROGRAMS, workers=1, own_network='"port"' not in debugger) as session:
+        yield Worlds(session, folder, measured, debugger)
 
 
 @contextmanager

@@ -177,7 +177,7 @@ class World:
         lose: For such topics, the share of messages that are lost.
         plan: Limits, clock and folder of the programs; None for programs of one's own, which run where they lie.
         measured: How coverage.py measures the lines of programs of one's own; empty if nobody measures them.
-        terminal: The device of the terminal at which a debugger in such a program reads and writes; empty for none.
+        debugger: Where a debugger of such programs is; empty without one.
 
     Attributes:
         session: What the programs run in.
@@ -197,7 +197,7 @@ class World:
         lose: Mapping[str, float] | None = None,
         plan: Plan | None = None,
         measured: str = "",
-        terminal: str = "",
+        debugger: str = "",
     ) -> None:
         self.session = session
         self._clock = clock_named(clock)
@@ -218,7 +218,7 @@ class World:
             working=str(Path.cwd()),
             interfaces=_modules_for(self._near[:1]),
             measured=measured,
-            terminal=terminal,
+            debugger=debugger,
         )
         self._plan = replace(plan, connections=tuple(_connections(seed, delay or {}, lose or {})))
         self._observations: list[Observation] = []

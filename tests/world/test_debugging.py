@@ -1,8 +1,11 @@
 """`--ros-debug` opens pdb in a program of a test, at a terminal and through what pytest captures."""
 
+import json
+import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pexpect
 import pytest
@@ -61,6 +64,63 @@ def test_pdb_changes_a_value_while_virtual_time_waits(folder: Path) -> None:
         shell.expect(pexpect.EOF)
         text = shell.before
     assert "1 passed" in text, text
+
+
+class Editor:
+    """The part of the Debug Adapter Protocol that an editor needs to attach itself and change a value."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._line = connection.makefile("rwb")
+        self._sent = 0
+
+    def ask(self, command: str, **arguments: Any) -> Any:
+        self.say(command, **arguments)
+        return self.await_message(lambda message: message.get("command") == command)
+
+    def say(self, command: str, **arguments: Any) -> None:
+        self._sent += 1
+        data = json.dumps({"seq": self._sent, "type": "request", "command": command, "arguments": arguments}).encode()
+        self._line.write(b"Content-Length: %d\r\n\r\n%s" % (len(data), data))
+        self._line.flush()
+
+    def await_message(self, is_wanted: Callable[[Any], bool]) -> Any:
+        while True:
+            header = self._line.readline() + self._line.readline()
+            message = json.loads(self._line.read(int(header.split()[1])))
+            if is_wanted(message):
+                return message
+
+    def close(self) -> None:
+        self._line.close()
+
+
+def test_an_editor_attaches_itself_and_virtual_time_waits(folder: Path) -> None:
+    """The program waits at its breakpoint until the editor is there, which is outside of its network otherwise."""
+    command = [
+        *("-m", "pytest", "-p", "grader.pytest_plugin", "-p", "no:cacheprovider"),
+        "--ros-debug-port=0",
+        "test_it.py",
+    ]
+    with pexpect.spawn(sys.executable, command, cwd=str(folder), timeout=None, encoding="utf-8") as shell:
+        assert shell.expect([r"counts.py waits for a debugger at 127.0.0.1:(\d+),", pexpect.EOF]) == 0, shell.before
+        assert shell.match is not None
+        with socket.create_connection(("127.0.0.1", int(shell.match[1]))) as connection:
+            editor = Editor(connection)
+            editor.ask("initialize", adapterID="test", pathFormat="path")
+            editor.say("attach", name="test")
+            editor.await_message(lambda message: message.get("event") == "initialized")
+            editor.say("configurationDone")
+            stopped = editor.await_message(lambda message: message.get("event") == "stopped")
+            thread = stopped["body"]["threadId"]
+            frame = editor.ask("stackTrace", threadId=thread)["body"]["stackFrames"][0]
+            assert frame["name"] == "on_timer"
+            assert frame["source"]["path"] == str(folder / "counts.py")
+            editor.ask("evaluate", expression="globals().update(count=7)", frameId=frame["id"], context="repl")
+            editor.ask("continue", threadId=thread)
+            editor.ask("disconnect")
+            editor.close()
+        shell.expect(pexpect.EOF)
+        assert "1 passed" in shell.before
 
 
 def test_without_a_terminal_it_says_so(folder: Path, pytester: pytest.Pytester) -> None:

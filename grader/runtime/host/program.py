@@ -78,7 +78,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
             `charged` to it, `seed` (hex), and whether it decides what runs first of all that is ready (`drawn_order`),
             whether its files lie `in_place`, `log_format`, `limits`, `steady_ns` of `VirtualTime.start`,
             `interfaces`, the folders of interface packages that are not installed, how its lines are `measured`,
-            None if they are not, and the `terminal` of its debugger, empty for none.
+            None if they are not, and where its `debugger` is, None
+            for none.
         host: What the parent process has prepared, if this process is a fork of one; no module of the submission may
             hide one that it has imported.
     """
@@ -105,12 +106,8 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     elif not hidden:  # otherwise done when the program imports rclpy
         install_ros()
         preload(os.path.join(request["root"], request["file"]))
-    if request["terminal"]:
-        from .debugging import debug_at  # with pdb, which no other program needs
-
-        debug_at(request["terminal"], os.path.basename(request["file"]))
-    # After what coverage imports, which is hidden from the program like the modules of the host.
-    time.before_stop = write_lines = measure_lines(request["measured"]) if request["measured"] else lambda: None
+    # Before imports are hidden, because what these import is none of the program's.
+    time.before_stop = write_lines = observe_own(request)
     # After the imports of the host: what they draw must not shift what the program draws.
     seed_randomness(request["seed"])
     # A child of the student's would answer on the same socket. On the wall clock it may live, but says nothing; in
@@ -127,7 +124,9 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
         time.start(start.now_ns, request["steady_ns"], charged=request["charged"])
     else:
         time.start(start.now_ns, request["steady_ns"])
-    watchdog = Watchdog(link, time, describer, request["limits"]) if isinstance(time, VirtualTime) else None
+    watchdog = None
+    if isinstance(time, VirtualTime) and not request["debugger"]:  # a debugger waits, and starts what it needs
+        watchdog = Watchdog(link, time, describer, request["limits"])
     if isinstance(time, VirtualTime) and watchdog is not None:
         watchdog.start()
         install_alarms(functools.partial(watchdog.give_up_outside, "alarm"))
@@ -161,6 +160,15 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
             link.send(FilesWritten(found))
     link.send(ending)
     originals.exit_now(0)
+
+
+def observe_own(request: dict[str, Any]) -> Callable[[], None]:
+    """Let a debugger and coverage see a program of whoever tests it; return what writes the lines that have run."""
+    if request["debugger"]:
+        from .debugging import let_stop  # with pdb, which no other program needs
+
+        let_stop(request["debugger"], os.path.basename(request["file"]))
+    return measure_lines(request["measured"]) if request["measured"] else lambda: None
 
 
 def clean_up(ending: Exited, root: str, time: VirtualTime | WallTime, watchdog: Watchdog | None) -> Exited:

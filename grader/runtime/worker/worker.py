@@ -60,8 +60,6 @@ if TYPE_CHECKING:
 #: Real seconds that a program has, on an idle machine, to end after the stop signal and to report what it wrote. Hardly
 #: any needs a tenth of it; only one that goes on regardless takes so long.
 LAST_REPORT_S = 2.0
-#: When a program that runs on is given up; see `Watchdog`.
-REAL_LIMITS = {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S}
 #: How often a run on the wall clock is tried if the machine is too busy, before the scenario is undecided.
 WALL_TRIES = 3
 #: The kernel's limits for the worker, if its resource monitor is too slow: mapped memory, and processor time beyond the
@@ -347,8 +345,8 @@ class Worker:
             "log_format": LOG_FORMAT,
             "python_paths": [str(p) for p in self._runtime.python_paths],
             "interfaces": plan.interfaces,
-            "terminal": plan.terminal,
-            "limits": dict.fromkeys(REAL_LIMITS, math.inf) if plan.terminal else REAL_LIMITS,
+            "debugger": json.loads(plan.debugger) if plan.debugger else None,
+            "limits": {"start_cpu_s": START_CPU_S, "wake_up_cpu_s": WAKE_UP_CPU_S, "blocked_s": BLOCKED_S},
             **told,
         }
         launcher = f"{self._isolation.host_seen_at}/launcher.py"
@@ -373,7 +371,7 @@ class Worker:
             theirs.close()
         student.file, student.places, student.arguments = file, Places(Path(plan.root)), start.words
         student.own_folder, student.keeps_paths = _own_folder(environment), bool(plan.working)
-        student.silence_s = math.inf if plan.terminal else student.silence_s
+        student.silence_s = math.inf if plan.debugger else student.silence_s
         student.launched_by, student.prefix = start.launched_by, next(iter(plan.prefixes), "")
         return student
 
