@@ -27,7 +27,7 @@ def measured_lines(folder: Path, *, combines: bool = False) -> str:
         folder: The working directory in which the measurement began.
         combines: Whether several files are put together in any case, as pytest-cov does.
     """
-    coverage = sys.modules.get("coverage")
+    coverage: Any = sys.modules.get("coverage")
     current: Any = None if coverage is None else coverage.Coverage.current()
     if current is None or not (combines or current.get_option("run:parallel")):
         return ""

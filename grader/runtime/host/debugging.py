@@ -108,7 +108,8 @@ def _real_modules() -> Iterator[None]:
     kept = {name: sys.modules.get(name) for name in REAL}
     try:
         for name in REAL:
-            spec = importlib.util.find_spec(name) if kept[name] is None else kept[name].__spec__
+            own = kept[name]
+            spec = importlib.util.find_spec(name) if own is None else own.__spec__
             assert spec is not None
             assert spec.loader is not None
             sys.modules[name] = copy = importlib.util.module_from_spec(spec)
