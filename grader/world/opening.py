@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -84,7 +85,7 @@ def open_worlds(folder: Path, *, measured: str = "", debugger: str = "") -> Iter
     if runs_a_test():
         raise EnvironmentFault("a test of a rubric runs programs in no world of its own", "use the fixture `ros`")
     # a debugger that attaches itself is outside, and could not reach a network of the programs' own
-    with open_session(OWN_PROGRAMS, workers=1, own_network='"port"' not in debugger) as session:
+    with open_session(OWN_PROGRAMS, workers=1, own_network="port" not in json.loads(debugger or "{}")) as session:
         yield Worlds(session, folder, measured, debugger)
 
 
