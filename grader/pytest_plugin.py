@@ -196,7 +196,10 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
     with contextlib.ExitStack() as stack:
         try:
             debugger = _debugger(pytestconfig)
-            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, measured=measured, debugger=debugger))
+            # where a debugger that attaches itself is, which is outside of a network of the programs' own
+            shared = pytestconfig.getoption("--ros-debug-port") is not None
+            options = {"measured": measured, "debugger": debugger, "own_network": not shared}
+            worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, **options))
         except EnvironmentFault as fault:
             pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
         pytestconfig.stash[_SHARED] = worlds.shared

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -71,21 +70,21 @@ class Worlds:
 
 
 @contextmanager
-def open_worlds(folder: Path, *, measured: str = "", debugger: str = "") -> Iterator[Worlds]:
+def open_worlds(folder: Path, *, measured: str = "", debugger: str = "", own_network: bool = True) -> Iterator[Worlds]:
     """Start what worlds run in, and end it at the end of the block.
 
     Args:
         folder: Where programs are looked for last.
         measured: How the lines of programs are measured; see `measured_lines`.
         debugger: Where a debugger of programs is; see `debugger_at`.
+        own_network: Whether programs get a network of their own, if possible; who is outside cannot reach them there.
 
     Raises:
         EnvironmentFault: This machine lacks ROS.
     """
     if runs_a_test():
         raise EnvironmentFault("a test of a rubric runs programs in no world of its own", "use the fixture `ros`")
-    # a debugger that attaches itself is outside, and could not reach a network of the programs' own
-    with open_session(OWN_PROGRAMS, workers=1, own_network="port" not in json.loads(debugger or "{}")) as session:
+    with open_session(OWN_PROGRAMS, workers=1, own_network=own_network) as session:
         yield Worlds(session, folder, measured, debugger)
 
 
