@@ -198,7 +198,7 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
             debugger = _debugger(pytestconfig)
             # where a debugger that attaches itself is, which is outside of a network of the programs' own
             shared = pytestconfig.getoption("--ros-debug-port") is not None
-            options = {"measured": measured, "debugger": debugger, "own_network": not shared}
+            options: dict[str, Any] = {"measured": measured, "debugger": debugger, "own_network": not shared}
             worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, **options))
         except EnvironmentFault as fault:
             pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
