@@ -110,7 +110,8 @@ OPEN_FIELDS = {
     *(f"Report.{name}" for name in ("notes", "staff_notes", "interfaces")),
     *(f"ExerciseReport.{name}" for name in ("id", "number", "title", "required", "clock")),
     *(f"ExerciseReport.{name}" for name in ("sources", "variant", "starts", "unchecked")),
-    *(f"Verdict.{name}" for name in ("outcome", "score", "max_score", "missing_file", "same_cause_as", "brief")),
+    *(f"Verdict.{name}" for name in ("outcome", "score", "max_score", "missing_file", "same_cause_as")),
+    *("Verdict.brief", "Verdict.recording"),
 }
 
 
