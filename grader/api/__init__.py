@@ -113,6 +113,9 @@ if TYPE_CHECKING:
     from grader.runtime.model.trace import Response as Response
     from grader.runtime.model.trace import ServiceEnd as ServiceEnd
     from grader.runtime.model.trace import Trace as Trace
+    from grader.runtime.served_actions import GoalAborted as GoalAborted
+    from grader.runtime.served_actions import GoalCanceled as GoalCanceled
+    from grader.runtime.served_actions import GoalRejected as GoalRejected
     from grader.runtime.simulation import DifferentialDrive as DifferentialDrive
     from grader.runtime.simulation import Moment as Moment
     from grader.runtime.simulation import Output as Output
@@ -127,9 +130,6 @@ if TYPE_CHECKING:
     from grader.world.asking import GoalResult as GoalResult
     from grader.world.asking import PendingCall as PendingCall
     from grader.world.asking import Received as Received
-    from grader.world.errors import GoalAborted as GoalAborted
-    from grader.world.errors import GoalCanceled as GoalCanceled
-    from grader.world.errors import GoalRejected as GoalRejected
     from grader.world.errors import NoMessage as NoMessage
     from grader.world.errors import ParameterRejected as ParameterRejected
     from grader.world.errors import ProgramFailed as ProgramFailed
@@ -206,9 +206,8 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.world.world": "World Launched Failure",
         "grader.world.asking": "Received PendingCall GoalHandle GoalResult",
         "grader.world.programs": "Program",
-        "grader.world.errors": (
-            "ProgramFailed StepTimeout NoMessage ParameterRejected WrongType GoalRejected GoalAborted GoalCanceled"
-        ),
+        "grader.world.errors": ("ProgramFailed StepTimeout NoMessage ParameterRejected WrongType"),
+        "grader.runtime.served_actions": "GoalRejected GoalAborted GoalCanceled",
     },
     "Tests": {
         "grader.testing": "TraceBuilder judge explain builtin_check",

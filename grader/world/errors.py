@@ -1,11 +1,6 @@
-"""What a stepped test fails with, and with what its actions end goals.
-
-The first are AssertionErrors, so that test runners count a failure and not an error.
-"""
+"""What a stepped test fails with: AssertionErrors, so that test runners count a failure and not an error."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from grader.runtime.model.trace import Fault
 
@@ -56,31 +51,3 @@ class NoMessage(IndexError):  # noqa: N818 - the same
         super().__init__(f"{reason}\n  hint: {hint}" if hint else reason)
         self.reason = reason
         self.hint = hint
-
-
-class GoalRejected(Exception):  # noqa: N818 - the same
-    """Raised by what answers a goal of an action that a test offers: refuse it."""
-
-
-class GoalAborted(Exception):  # noqa: N818 - the same
-    """Raised by what answers a goal: abort it.
-
-    Attributes:
-        result: The result, an object of its class; None for its default values.
-    """
-
-    def __init__(self, result: Any = None) -> None:
-        super().__init__()
-        self.result = result
-
-
-class GoalCanceled(Exception):  # noqa: N818 - the same
-    """Raised in the generator that answers a goal, at its pause, when the goal is cancelled.
-
-    Attributes:
-        result: The result, as above, if the generator raises it itself.
-    """
-
-    def __init__(self, result: Any = None) -> None:
-        super().__init__()
-        self.result = result

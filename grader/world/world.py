@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -37,6 +38,7 @@ from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, r
 from grader.runtime.programs.executables import package_of
 from grader.runtime.serialization import (
     QoSProfile,
+    bytes_of,
     message_type_name,
     parameter_message,
     qos_words,
@@ -45,6 +47,7 @@ from grader.runtime.serialization import (
     service_type,
     type_of_part,
 )
+from grader.runtime.served_actions import TOPICS_OF_ACTIONS, ServedAction
 from grader.runtime.session import RecordingSession, SteppedRun
 from grader.runtime.simulation import Moment, Simulation, types_heard
 from grader.runtime.simulation.loading import made_simulation
@@ -63,7 +66,6 @@ from grader.runtime.steps import (
 )
 from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
-from grader.world.actions import ServedAction
 from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
 from grader.world.interfaces import let_import, modules_for
@@ -634,6 +636,8 @@ class World:
         name: str,
         type: Any,  # noqa: A002 - as in rclpy
         answer: Callable[[Any], Any] | Sequence[Any],
+        *,
+        preempts: bool = False,
     ) -> None:
         """Offer an action; serving it again replaces what answers goals from then on.
 
@@ -646,6 +650,7 @@ class World:
                 A list may end with the result, as a generator does that returns it; without one, the result has its
                 default values. `GoalRejected` before the first pause refuses the goal, `GoalAborted` aborts it, and a
                 generator whose goal is cancelled gets `GoalCanceled`: it may return a result. An error ends a list.
+            preempts: Whether a goal that is accepted aborts the one before it, as Nav2 does.
 
         Raises:
             WrongType: A program has a client of another type.
@@ -656,9 +661,9 @@ class World:
         if known is not None and known.type != interface:
             raise ValueError(f"{name}: expected {known.type}, as it is served already, found {interface}")
         if known is not None:
-            known.answer = answer
+            known.answer, known.preempts = answer, preempts
             return
-        self._actions[name] = ServedAction(name, interface, answer)
+        self._actions[name] = ServedAction(name, interface, answer, preempts=preempts)
         self._fits = False
         self._perform(ServeAction(name, interface))
 
@@ -1150,9 +1155,10 @@ class World:
             return dict(answer) if isinstance(answer, Mapping) else [*answer]
         if question["ask"] == "action":
             now = Moment(question["now_ns"], question["clock_ns"])
-            return self._actions[question["action"]].attend(
+            done = self._actions[question["action"]].attend(
                 now, question["part"], question["number"], question["request"]
             )
+            return done | {"does": [_portable(*one) for one in done["does"]]}
         name = question["service"]
         kind, function = self._functions[name]
         response = function(built(kind.Request, question["request"], name))
@@ -1160,6 +1166,13 @@ class World:
             found = type(response).__name__
             raise TypeError(f"{name}: expected a {kind.__name__}.Response from its function, found {found}")
         return plain_fields(response)
+
+
+def _portable(part: str, number: int, content: Any) -> tuple[str, int, Any]:
+    """Return what an action does as JSON values: a message as its bytes."""
+    if part in TOPICS_OF_ACTIONS:
+        return part, number, base64.b64encode(bytes_of(content)).decode()
+    return part, number, content
 
 
 def _modules_for(folders: Sequence[Path]) -> tuple[str, ...]:

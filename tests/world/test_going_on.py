@@ -10,7 +10,8 @@ from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
 from grader.runtime.model.errors import RecordingError, SubmissionError
-from grader.world.errors import GoalAborted, GoalRejected, StepTimeout
+from grader.runtime.served_actions import GoalAborted, GoalRejected
+from grader.world.errors import StepTimeout
 from grader.world.opening import Worlds
 from grader.world.programs import Program
 from grader.world.world import World

@@ -26,7 +26,7 @@ from grader.runtime.model.errors import HarnessError, RecordingError, RubricErro
 from grader.runtime.model.quantities import duration
 from grader.runtime.model.scenario import Scenario, is_launch_file, shortest
 from grader.runtime.model.wording import printable
-from grader.runtime.stimuli import RecordedStream, Simulated
+from grader.runtime.stimuli import ActionServer, RecordedStream, Simulated
 
 #: The points of a rubric should add up to a multiple of this, for easy arithmetic.
 ROUND = 5
@@ -113,6 +113,8 @@ def _published(criterion: Criterion) -> Iterator[str]:
 def _given(scenario: Scenario) -> set[str]:
     """Return the topics, services and actions that the stimuli of a scenario use."""
     names = {getattr(one, key) for one in scenario.stimuli for key in _ENDS if hasattr(one, key)}
+    offered_by_plan = (one.action for one in scenario.stimuli if isinstance(one, ActionServer))
+    names |= {f"{action}/_action/{topic}" for action in offered_by_plan for topic in ("feedback", "status")}
     for one in _simulations(scenario):
         names |= {*one.publishes, *one.serves}
     return names
@@ -130,7 +132,7 @@ def _simulations(scenario: Scenario) -> Iterator[Offered]:
 
 def _misspelt(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
     """Yield what stimuli use and no check names, if a check names something very similar that no stimulus uses."""
-    asked = {getattr(c.check, key, None) for c in exercise.criteria for key in (*_ENDS, "input", "output", "goals")}
+    asked = (getattr(c.check, key, None) for c in exercise.criteria for key in (*_ENDS, "input", "output", "goals"))
     named = {name for name in asked if isinstance(name, str)}
     used = {name for scenario in exercise.scenarios for name in (*_given(scenario), *_heard(scenario))}
     for index, scenario in enumerate(exercise.scenarios):

@@ -159,7 +159,7 @@ def choice_model(name: str, summary: str, options: Mapping[str, Any]) -> type[Ch
 @lru_cache(maxsize=256)
 def _parameters(cls: type) -> type[Shape]:
     """Return the model of a check; its fields have the same names in rubrics as in Python."""
-    hints = get_type_hints(cls, include_extras=True)
+    hints = get_type_hints(cls, localns=_RECURSIVE, include_extras=True)
     forms = _forms(cls)
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(cls):
@@ -297,6 +297,8 @@ def _accepted(annotation: object, form: object = Text) -> object:
         return _BY_KIND[kind.name]
     if _mark(annotation, FieldOf):
         annotation = get_args(annotation)[0]
+    if get_origin(annotation) is Annotated and not (_mark(annotation, Unit) or _mark(annotation, Least)):
+        annotation = get_args(annotation)[0]  # with a text alone, which describes it
     if annotation is str:
         return form
     for known, accepted in _BY_ANNOTATION:

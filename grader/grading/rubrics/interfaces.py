@@ -272,6 +272,9 @@ class _Checked:
         for named, on in (*self._of_stimuli(), *self._of_checks()):
             if interfaces.fields(named.type) is not None:
                 self._types.setdefault(on, set()).add(named.type)
+                if "/action/" in named.type:  # its feedback is a topic, which checks may read like any other
+                    feedback = f"{named.type}_FeedbackMessage"
+                    self._types.setdefault(f"{on}/_action/feedback", set()).add(feedback)
 
     def _of_stimuli(self) -> Iterator[tuple[_Named, str]]:
         for path, stimulus in self._stimuli:
@@ -299,12 +302,12 @@ class _Checked:
             if unknown := self._interfaces.unknown(named.type, named.where):
                 yield unknown
         for path, stimulus in self._stimuli:
-            key, _, part = stimulus.becomes.holds or ("", "", "")
-            type_ = f"{getattr(stimulus, 'type', '')}{part and f'_{part}'}"
-            if key and (*path, key) in self._tree.values and self._interfaces.fields(type_) is not None:
-                raw = self._raw((*path, key))
-                each = [((*path, key), raw)] if isinstance(raw, Mapping) else _cases(raw, (*path, key))
-                yield from (m for place, value in each for m in self._in_message(value, type_, place))
+            for key, _, part in stimulus.becomes.holds:
+                type_ = f"{getattr(stimulus, 'type', '')}{part and f'_{part}'}"
+                if (*path, key) in self._tree.values and self._interfaces.fields(type_) is not None:
+                    raw = self._raw((*path, key))
+                    each = [((*path, key), raw)] if isinstance(raw, Mapping) else _cases(raw, (*path, key))
+                    yield from (m for place, value in each for m in self._in_message(value, type_, place))
 
         for path, offered_ in self._simulated:
             for topic, value in offered_.outputs:

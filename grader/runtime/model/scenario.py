@@ -163,14 +163,14 @@ class Content(NamedTuple):
 
     field: str  # its field that holds them
     kind: str  # what its type is: `msg`, `srv` or `action`
-    part: str = ""  # the part of that type that has the fields: `Request`, `Response` or `Goal`
+    part: str = ""  # the part of that type that has the fields, such as `Request` or `Goal`
 
 
 class Planned:
     """A stimulus with every value drawn, as plain JSON values; times since the scenario's start."""
 
     __slots__ = ()
-    holds: ClassVar[Content | None] = None
+    holds: ClassVar[tuple[Content, ...]] = ()
 
     @property
     def place(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from grader.runtime.model.scenario import Planned, Stimulus
+from grader.runtime.stimuli.action_server import ActionServer
 from grader.runtime.stimuli.calls import ServiceCalls
 from grader.runtime.stimuli.goals import ActionGoal, PlannedGoal
 from grader.runtime.stimuli.messages import MessageStream
@@ -17,6 +18,7 @@ from grader.runtime.stimuli.simulation import Simulated
 __all__ = [
     "KINDS",
     "PLANNED",
+    "ActionServer",
     "PlannedGoal",
     "RecordedStream",
     "Recording",
@@ -35,6 +37,7 @@ KINDS: tuple[type[Stimulus], ...] = (
     ServiceCalls,
     ActionGoal,
     Simulated,
+    ActionServer,
 )
 #: What they become, by the names under which plans are sent to workers.
 PLANNED: Mapping[str, type[Planned]] = {kind.becomes.__name__: kind.becomes for kind in KINDS}

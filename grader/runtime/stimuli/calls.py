@@ -36,7 +36,7 @@ from grader.runtime.stimuli.phrases import count_phrase, time_phrase
 class PlannedCalls(Planned):
     """Calls with every request drawn, `clients` of them for each call in turn."""
 
-    holds: ClassVar[Content | None] = Content("requests", "srv", "Request")
+    holds: ClassVar[tuple[Content, ...]] = (Content("requests", "srv", "Request"),)
 
     service: str
     type: str

@@ -18,7 +18,7 @@ from grader.runtime.stimuli.phrases import time_phrase
 class PlannedGoal(Planned):
     """A goal with every field drawn, and its goal id."""
 
-    holds: ClassVar[Content | None] = Content("goal", "action", "Goal")
+    holds: ClassVar[tuple[Content, ...]] = (Content("goal", "action", "Goal"),)
 
     action: str
     type: str

@@ -40,7 +40,7 @@ from grader.runtime.stimuli.phrases import cases_phrase, count_phrase, time_phra
 class PlannedMessages(Planned):
     """A message stream with every field drawn."""
 
-    holds: ClassVar[Content | None] = Content("values", "msg")
+    holds: ClassVar[tuple[Content, ...]] = (Content("values", "msg"),)
 
     topic: str
     type: str

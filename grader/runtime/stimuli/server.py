@@ -25,7 +25,7 @@ from grader.runtime.stimuli.phrases import cases_phrase, is_drawn, time_phrase
 class PlannedServer(Planned):
     """A server with every response drawn."""
 
-    holds: ClassVar[Content | None] = Content("responses", "srv", "Response")
+    holds: ClassVar[tuple[Content, ...]] = (Content("responses", "srv", "Response"),)
 
     service: str
     type: str

@@ -8,18 +8,22 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from grader.runtime.host.protocol import Claim, ThreadFault
+from grader.runtime.message_classes import plain_fields
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import ClockKind, Mark, Observation, Offer, Trace
 from grader.runtime.plan import Plan
+from grader.runtime.served_actions import PARTS_OF_ACTIONS, TOPICS_OF_ACTIONS, ServedAction, planned_action
 from grader.runtime.simulation.participant import Moment
+from grader.runtime.stimuli.action_server import AddAction, Attend
 from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCalls
 from grader.runtime.stimuli.events import Disappear, TopicEvent, events_in_order
-from grader.runtime.stimuli.server import AddServer, RemoveServer, Respond
+from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
+from grader.runtime.stimuli.server import AddServer, PlannedServer, RemoveServer, Respond
 from grader.runtime.stimuli.simulation import Step
 from grader.runtime.worker.core import Agenda, Taken
 from grader.runtime.worker.ending import never_stopped, reported_fault
 from grader.runtime.worker.observer import Observer
-from grader.runtime.worker.service_peers import ServicePeers
+from grader.runtime.worker.service_peers import LATER, ServicePeers
 from grader.runtime.worker.simulations import Simulations
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.topic_peers import TopicPeers
@@ -51,6 +55,9 @@ class Runner(ABC):
         self._stop_ns = 0
         self.fills_machine: Callable[[], bool] = lambda: False
         self._simulations = Simulations(plan)
+        self._actions: dict[str, ServedAction] = {}
+        self._parts: dict[str, tuple[str, str]] = {}  # service of an action -> the action, and which part of it that is
+        self._streams: dict[str, PlannedMessages] = {}  # topic of an action -> what it is published as
         self._transits = {connection.topic: Transit(connection) for connection in plan.connections}
         # Simulations last: of two events at one instant, that of the plan comes first.
         planned = events_in_order([*plan.events(), *self._simulations.events()])
@@ -183,7 +190,9 @@ class Runner(ABC):
         self, now_ns: int, service: str, request: Mapping[str, Any], number: int
     ) -> Mapping[str, Any] | None:
         """Return the response to a request at a time; None if nothing but the plan says what it is."""
-        del number  # a simulation answers at once
+        if service in self._parts:  # what is done with a goal may take time, and publish
+            self._agenda.later(Attend(now_ns, *self._parts[service], number, request))
+            return LATER
         return self._simulations.answer(service, request, self._moment(now_ns))
 
     def _moment(self, now_ns: int) -> Moment:
@@ -233,7 +242,17 @@ class Runner(ABC):
             for message in published:
                 self._send(message, now_ns)
             self._agenda.later(following)
-        elif isinstance(event, AddServer):
+        elif isinstance(event, AddAction):
+            self._actions[event.server.action] = planned_action(event.server)
+            self._offer_action(event.server.action, event.server.type, now_ns)
+        elif isinstance(event, Attend):
+            self._attend(event, now_ns)
+        else:
+            self._do_service(event, now_ns)
+
+    def _do_service(self, event: Event, now_ns: int) -> None:
+        """Execute one event of a server or client."""
+        if isinstance(event, AddServer):
             self._services.add_server(now_ns, event.server)
         elif isinstance(event, RemoveServer):
             self._services.remove_server(now_ns, event.server)
@@ -247,3 +266,42 @@ class Runner(ABC):
                 self._announce_exchange("request", self._services.call(now_ns, event.call), 1)
             else:
                 self._services.wait(event)  # until its server exists
+
+    def _offer_action(self, action: str, interface: str, now_ns: int) -> None:
+        """Advertise the topics of an action, and offer its services."""
+        for topic, (type_, latched) in TOPICS_OF_ACTIONS.items():
+            name, fields = f"{action}/_action/{topic}", {"best_effort": False, "latched": latched}
+            stream = PlannedMessages(name, type_.format(interface), 0, 0, 1, 0, values=(), **fields)
+            self._streams[name] = stream
+            self._do(Advertise(now_ns, name, stream), now_ns)
+        for part, type_ in PARTS_OF_ACTIONS.items():
+            service = f"{action}/_action/{part}"
+            self._parts[service] = action, part
+            server = PlannedServer(service, type_.format(interface), 0, 0, 0, cycle=False, answers=0, responses=())
+            self._do_service(AddServer(now_ns, server), now_ns)
+        self._tell_servers()
+
+    @abstractmethod
+    def _tell_servers(self) -> None:
+        """Let the processes learn of servers that came or went; on the real clock, they do so by themselves."""
+
+    def _attend(self, event: Attend, now_ns: int) -> None:
+        """Do what an action does now: respond, publish, and come back when its time has come."""
+        answer = self._attended(event, now_ns)
+        for part, number, content in answer["does"]:
+            name = f"{event.action}/_action/{part}"
+            if part in TOPICS_OF_ACTIONS:
+                self._send(self._published(name, content, now_ns), now_ns)
+            elif self._services.respond(now_ns, name, number, content):
+                self._announce_exchange("response", name, 1)
+        for wake_ns in answer["wakes_ns"]:
+            self._agenda.later(Attend(max(now_ns, wake_ns), event.action))
+
+    def _attended(self, event: Attend, now_ns: int) -> Mapping[str, Any]:
+        """Return what an action does now; see `ServedAction.attend`."""
+        moment = self._moment(now_ns)
+        return self._actions[event.action].attend(moment, event.part, event.number, event.request)
+
+    def _published(self, topic: str, content: Any, now_ns: int) -> Event:
+        """Return the event that publishes a message of an action."""
+        return PublishFields(now_ns, topic, self._streams[topic], plain_fields(content))

@@ -278,9 +278,7 @@ def check_types(plan: Plan) -> None:
 
 def check_fields(planned: Any, where: str) -> None:
     """Check that this machine has the type and the fields of a stimulus; raises HarnessError otherwise."""
-    if planned.holds is None:
-        return
-    name, kind, part = planned.holds
-    message, fields = wanted_class(planned.type, kind, where), getattr(planned, name)
-    for value in ({}, *((fields,) if isinstance(fields, Mapping) else fields)):
-        built(getattr(message, part) if part else message, value, where)
+    for name, kind, part in planned.holds:
+        message, fields = wanted_class(planned.type, kind, where), getattr(planned, name)
+        for value in ({}, *((fields,) if isinstance(fields, Mapping) else fields)):
+            built(getattr(message, part) if part else message, value, where)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import field
 from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
@@ -31,6 +30,7 @@ from grader.runtime.steps import (
     Simulate,
     StartProcesses,
 )
+from grader.runtime.stimuli.action_server import Attend
 from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCall, PlannedCalls
 from grader.runtime.stimuli.events import Disappear, TopicEvent
 from grader.runtime.stimuli.goals import goal_call
@@ -39,19 +39,12 @@ from grader.runtime.stimuli.recorded import PublishRecorded
 from grader.runtime.stimuli.server import AddServer, PlannedServer
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.runner import Runner
-from grader.runtime.worker.service_peers import LATER, check_fields
+from grader.runtime.worker.service_peers import check_fields
 from grader.runtime.worker.student_process import NodeProcess
 
 #: Starts the processes of a plan; returns each with the time to wait before it runs, in nanoseconds. What a launch file
 #: asks for and nobody starts is added to the list, as sentences.
 Starter = Callable[[Plan, list[str]], Iterable[tuple[NodeProcess, int]]]
-#: The services of an action with their types, by the type of the action; and its topics, with whether they are latched.
-PARTS_OF_ACTIONS = {
-    "send_goal": "{}_SendGoal",
-    "cancel_goal": "action_msgs/srv/CancelGoal",
-    "get_result": "{}_GetResult",
-}
-TOPICS_OF_ACTIONS = {"feedback": ("{}_FeedbackMessage", False), "status": ("action_msgs/msg/GoalStatusArray", True)}
 #: Asks the other side, which answers with a value that fits the question.
 Question = Callable[[Mapping[str, Any]], Any]
 
@@ -62,16 +55,6 @@ class PublishNext(TopicEvent):
 
     stream: Stream
     number: int
-
-
-@dataclass(frozen=True, slots=True)
-class Attend(Event):
-    """Attend to an action of the other side: to a request to a part of it, or because its time has come."""
-
-    action: str
-    part: str = ""
-    number: int = 0
-    request: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Stream:
@@ -120,7 +103,6 @@ class SteppedRunner(Runner):
         self._on_topics: dict[str, Stream] = {}
         self._offered: dict[str, PlannedMessages] = {}
         self._served: set[str] = set()
-        self._parts: dict[str, tuple[str, str]] = {}  # service of an action -> the action, and which part of it that is
         self._faults: list[Fault] = []
 
     @property
@@ -144,7 +126,7 @@ class SteppedRunner(Runner):
             case Serve():
                 self._serve(command.service, command.type)
             case ServeAction():
-                self._serve_action(command)
+                self._offer_action(command.action, command.type, self._time_ns())
             case CallService():
                 return self._call(command)
             case SendGoal():
@@ -278,9 +260,6 @@ class SteppedRunner(Runner):
         self._agenda.later(first)
 
     def _do(self, event: Event, now_ns: int) -> None:
-        if isinstance(event, Attend):
-            self._attend(event, now_ns)
-            return
         if not isinstance(event, PublishNext):
             super()._do(event, now_ns)
             return
@@ -297,37 +276,18 @@ class SteppedRunner(Runner):
             self._served.add(service)
             self._do(AddServer(self._time_ns(), server), self._time_ns())
 
-    def _serve_action(self, command: ServeAction) -> None:
-        """Offer the services of an action, and advertise its topics."""
-        name, now_ns = f"{command.action}/_action", self._time_ns()
-        for part, interface in PARTS_OF_ACTIONS.items():
-            self._parts[f"{name}/{part}"] = command.action, part
-            self._serve(f"{name}/{part}", interface.format(command.type))
-        for topic, (interface, latched) in TOPICS_OF_ACTIONS.items():
-            fields: Any = {"best_effort": False, "latched": latched}
-            offer = PlannedMessages(f"{name}/{topic}", interface.format(command.type), 0, 0, 1, 0, values=(), **fields)
-            self._do(Advertise(now_ns, offer.topic, offer), now_ns)
-
-    def _attend(self, event: Attend, now_ns: int) -> None:
-        """Ask what an action does now, and do it: respond, publish, and come back when its time has come."""
+    def _attended(self, event: Attend, now_ns: int) -> Mapping[str, Any]:
         asked = {"action": event.action, "part": event.part, "number": event.number, "request": event.request}
         answer = self._ask({"ask": "action", **asked, "now_ns": now_ns, "clock_ns": self._clock_ns(now_ns)})
-        for part, number, content in answer["does"] if isinstance(answer, dict) else ():
-            name = f"{event.action}/_action/{part}"
-            if part in TOPICS_OF_ACTIONS:
-                self._send(PublishRecorded(now_ns, name, base64.b64decode(content), {}), now_ns)
-            elif self._services.respond(now_ns, name, number, content):
-                self._announce_exchange("response", name, 1)
-        for wake_ns in answer["wakes_ns"] if isinstance(answer, dict) else ():
-            self._agenda.later(Attend(max(now_ns, wake_ns), event.action))
+        return answer if isinstance(answer, dict) else {"does": (), "wakes_ns": ()}
+
+    def _published(self, topic: str, content: Any, now_ns: int) -> Event:
+        return PublishRecorded(now_ns, topic, base64.b64decode(content), {})
 
     def _simulated(
         self, now_ns: int, service: str, request: Mapping[str, Any], number: int
     ) -> Mapping[str, Any] | None:
-        if service in self._parts:
-            self._agenda.later(Attend(now_ns, *self._parts[service], number, request))
-            return LATER
-        if service not in self._served:
+        if service in self._parts or service not in self._served:
             return super()._simulated(now_ns, service, request, number)
         answer = self._ask({"ask": "service", "service": service, "request": request, "now_ns": now_ns})
         return answer if isinstance(answer, dict) else None

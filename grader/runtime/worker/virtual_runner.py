@@ -274,7 +274,11 @@ class VirtualRunner(Runner):
             return
         super()._do(event, now_ns)
         if isinstance(event, (AddServer, RemoveServer)):
-            self._discovery.tell_all()
+            self._tell_servers()
+
+    def _tell_servers(self) -> None:
+        # Of an action only once all of it is there: a client waits for each of its services and topics.
+        self._discovery.tell_all()
 
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
         self._core.exchanged(kind, service, count)

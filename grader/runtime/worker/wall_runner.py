@@ -277,6 +277,9 @@ class WallRunner(Runner):
     def _announce_exchange(self, kind: str, service: str, count: int) -> None:
         """Do nothing: on the real clock, processes receive messages by themselves."""
 
+    def _tell_servers(self) -> None:
+        """Do nothing: on the real clock, processes discover servers by themselves."""
+
     def _is_served(self, calls: PlannedCalls) -> bool:
         service = self._services.add_clients(calls)
         return service is not None and self._observer.services.is_matched(service)

@@ -196,6 +196,8 @@ def test_which_checks_measure() -> None:
         "latency": ("time to the next message", "s", "less"),
         "silence": ("number of messages", "", "less"),
         "field_in_range": ("distance from the range", "", "less"),
+        "cancels_goal": ("time to the request to cancel", "s", "less"),
+        "after_goal": ("time to the next goal", "s", "less"),
         "reaches_goal": ("time to a goal", "s", "less"),
         "stays_in_range": ("distance from the range", "", "less"),
     }

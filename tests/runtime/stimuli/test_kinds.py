@@ -26,6 +26,7 @@ ABOUT = {
         "grading/model/exercise.py",
         "runtime/plan.py",
     },
+    "ActionServer": {"course/authoring/checking.py"},
     "ServiceCalls": {"grading/rubrics/drawing.py", "grading/rubrics/model.py"},
     "Simulated": {
         "course/authoring/checking.py",
@@ -57,7 +58,7 @@ from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishF
 class PlannedBurst(Planned):
     """Messages of one instant."""
 
-    holds: ClassVar[Content | None] = Content("values", "msg")
+    holds: ClassVar[tuple[Content, ...]] = (Content("values", "msg"),)
 
     topic: str
     type: str

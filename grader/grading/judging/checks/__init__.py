@@ -4,6 +4,7 @@ from grader.grading.judging.checks.actions import ActionFeedback, ActionResult, 
 from grader.grading.judging.checks.clients import CallsOfClient, WaitsForService
 from grader.grading.judging.checks.closed_loop import ReachesGoal, StaysInRange
 from grader.grading.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
+from grader.grading.judging.checks.goal_clients import AfterGoal, CancelsGoal, SendsGoals
 from grader.grading.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.grading.judging.checks.heard import LogsResponse, LogsTexts
 from grader.grading.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
@@ -63,6 +64,9 @@ CHECKS: dict[str, type] = {
     "action_result": ActionResult,
     "action_feedback": ActionFeedback,
     "lifecycle_states": LifecycleStates,
+    "sends_goals": SendsGoals,
+    "cancels_goal": CancelsGoal,
+    "after_goal": AfterGoal,
     "transform": Transform,
     "reaches_goal": ReachesGoal,
     "stays_in_range": StaysInRange,

@@ -1,20 +1,58 @@
-"""Actions that a test offers: what a function or a list of steps does with each goal, in virtual time."""
+"""Actions that the grader offers, for a rubric or a test: what steps or a function do with each goal.
+
+Nothing here sends or waits: `attend` returns what is to be done at a moment, and when to come back.
+"""
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import field
 from enum import IntEnum
 from types import GeneratorType
 from typing import Any
 
-from grader.runtime.message_classes import built, message_class, plain_fields
+from grader.runtime.message_classes import built, message_class, plain_fields, wanted_class
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.serialization import action_type, bytes_of
 from grader.runtime.simulation import Moment
-from grader.world.errors import GoalAborted, GoalCanceled, GoalRejected
+from grader.runtime.stimuli.action_server import PlannedActionServer
+
+
+class GoalRejected(Exception):  # noqa: N818 - reads as what happened
+    """Raised by what answers a goal of an action that a test offers: refuse it."""
+
+
+class GoalAborted(Exception):  # noqa: N818 - the same
+    """Raised by what answers a goal: abort it.
+
+    Attributes:
+        result: The result, an object of its class; None for its default values.
+    """
+
+    def __init__(self, result: Any = None) -> None:
+        super().__init__()
+        self.result = result
+
+
+class GoalCanceled(Exception):  # noqa: N818 - the same
+    """Raised in the generator that answers a goal, at its pause, when the goal is cancelled.
+
+    Attributes:
+        result: The result, as above, if the generator raises it itself.
+    """
+
+    def __init__(self, result: Any = None) -> None:
+        super().__init__()
+        self.result = result
+
+
+#: The services of an action with their types, by the type of the action; and its topics, with whether they are latched.
+PARTS_OF_ACTIONS = {
+    "send_goal": "{}_SendGoal",
+    "cancel_goal": "action_msgs/srv/CancelGoal",
+    "get_result": "{}_GetResult",
+}
+TOPICS_OF_ACTIONS = {"feedback": ("{}_FeedbackMessage", False), "status": ("action_msgs/msg/GoalStatusArray", True)}
 
 
 class GoalState(IntEnum):
@@ -68,18 +106,30 @@ class ServedAction:
         name: Its name.
         type: Its type.
         answer: See `World.serve_action`.
+        preempts: Whether a goal that is accepted aborts the one before it.
     """
 
-    def __init__(self, name: str, type: str, answer: Callable[[Any], Any] | Sequence[Any]) -> None:  # noqa: A002
+    def __init__(
+        self,
+        name: str,
+        type: str,  # noqa: A002
+        answer: Callable[[Any], Any] | Sequence[Any],
+        *,
+        preempts: bool = False,
+    ) -> None:
         self.name = name
         self.type = type
         self.answer = answer
-        self._kind = action_type(type)
+        self.preempts = preempts
+        self._kind = wanted_class(type, "action", name)
         self._goals: dict[tuple[int, ...], _Goal] = {}
         self._does: list[tuple[str, int, Any]] = []
 
     def attend(self, now: Moment, part: str, number: int, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what is done at a moment: responses and messages in their order, and when to come back.
+        """Return what is done at a moment, and when to come back.
+
+        It is in order: for a service its name, the number of the request and the fields of the response; for a topic
+        its name, 0 and the message.
 
         Args:
             now: The moment.
@@ -116,6 +166,9 @@ class ServedAction:
         self._does = [*before, ("send_goal", number, accepted), *self._does]
         if goal.wake_ns is not None:
             self._tell_status()
+        for other in [one for one in self._goals.values() if one is not goal and one.wake_ns is not None]:
+            if self.preempts:
+                self._go_on(other, now, lambda one=other: one.steps.throw(GoalAborted()))  # type: ignore[misc]
 
     def _steps(self, goal: Any) -> Steps:
         """Go through what answers a goal; return the result."""
@@ -202,7 +255,34 @@ class ServedAction:
         self._publish("status", built(message_class(STATUS_TYPE), {"status_list": known}, self.name))
 
     def _publish(self, topic: str, message: Any) -> None:
-        self._does.append((topic, 0, base64.b64encode(bytes_of(message)).decode()))
+        self._does.append((topic, 0, message))
+
+
+def planned_action(planned: PlannedActionServer) -> ServedAction:
+    """Return the action of a plan, whose goals are answered one after the other as it says."""
+    kind = wanted_class(planned.type, "action", planned.action)
+    place = 0
+
+    def steps(_: Any) -> Steps:
+        nonlocal place
+        number, place = place, place + 1
+        wanted = planned.goals[min(number, len(planned.goals) - 1)]
+        if not wanted.accepts:
+            raise GoalRejected
+        left_ns, every_ns, told = wanted.result_after_ns, wanted.feedback_every_ns, 0
+        while 0 < every_ns < left_ns:
+            yield every_ns / NS_PER_S
+            fields = planned.feedback[min(told, len(planned.feedback) - 1)] if planned.feedback else {}
+            yield built(kind.Feedback, fields, planned.action)
+            left_ns, told = left_ns - every_ns, told + 1
+        yield left_ns / NS_PER_S
+        fields = planned.results[min(number, len(planned.results) - 1)] if planned.results else {}
+        result = built(kind.Result, fields, planned.action)
+        if wanted.aborts:
+            raise GoalAborted(result)
+        return result
+
+    return ServedAction(planned.action, planned.type, steps, preempts=planned.preempts)
 
 
 def _info(goal: _Goal) -> dict[str, Any]:

@@ -1,0 +1,198 @@
+"""Clients of an action: what they send, when they cancel, and what follows a goal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from tracing import Recording
+
+from grader.grading.judging.checks.goal_clients import AfterGoal, CancelsGoal, SendsGoals, sent_goals
+from grader.grading.model.exercise import Finding, ProblemKind
+from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
+from grader.runtime.model.trace import Trace
+
+ACTION, TYPE = "/count", "test_msgs/action/Fibonacci"
+STATUS = {"succeeded": 4, "canceled": 5, "aborted": 6}
+
+
+def uuid(number: int) -> dict[str, Any]:
+    """Return the id of a goal."""
+    return {"uuid": [number] * 16}
+
+
+class Client(Recording):
+    """A recording of a client's goals."""
+
+    def offered(self) -> Client:
+        """Offer the action."""
+        self.mark(0, "server_starts", f"{ACTION}/_action/send_goal")
+        return self
+
+    def goal(self, t_s: float, number: int, order: int, *, accepted: bool = True) -> Client:
+        """Send a goal, which is answered at once."""
+        service, value = f"{ACTION}/_action/send_goal", {"goal_id": uuid(number), "goal": {"order": order}}
+        self.request(t_s, service, number, "student", value, f"{TYPE}_SendGoal")
+        self.response(t_s, service, number, {"accepted": accepted}, "grader", f"{TYPE}_SendGoal")
+        return self
+
+    def result(self, t_s: float, number: int, status: str) -> Client:
+        """Ask for the result, which comes then."""
+        service = f"{ACTION}/_action/get_result"
+        self.request(t_s - 0.1, service, number, "student", {"goal_id": uuid(number)}, f"{TYPE}_GetResult")
+        self.response(t_s, service, number, {"status": STATUS[status]}, "grader", f"{TYPE}_GetResult")
+        return self
+
+    def cancel(self, t_s: float, number: int) -> Client:
+        """Ask to cancel a goal."""
+        value = {"goal_info": {"goal_id": uuid(number)}}
+        self.request(t_s, f"{ACTION}/_action/cancel_goal", number, "student", value, "action_msgs/srv/CancelGoal")
+        return self
+
+    def feedback(self, t_s: float, number: int, *sequence: int) -> Client:
+        """Tell a client something about a goal."""
+        value = {"goal_id": uuid(number), "feedback": {"sequence": list(sequence)}}
+        self.deliver(t_s, f"{ACTION}/_action/feedback", value, f"{TYPE}_FeedbackMessage")
+        return self
+
+
+def client(stop_s: float = 20.0) -> Client:
+    """Return an empty recording."""
+    return Client(stop_s).offered()
+
+
+def found(check: Any, recording: Client) -> tuple[float, str]:
+    """Return credit and reason."""
+    finding: Finding = check.judge(recording.trace())
+    return float(finding.credit), finding.reason
+
+
+def test_goals_are_read_with_their_ends() -> None:
+    """By their ids, whatever the order of the results."""
+    recording = client().goal(1, 1, 5).goal(2, 2, 6, accepted=False).goal(3, 3, 7).result(9, 3, "aborted").cancel(4, 3)
+    goals = sent_goals(recording.result(6, 1, "succeeded").trace(), ACTION)
+    assert [(g.content["order"], g.end, g.end_ns // NS_PER_S) for g in goals] == [
+        (5, "succeeded", 6),
+        (6, "rejected", 2),
+        (7, "aborted", 9),
+    ]
+    assert [g.cancels_ns for g in goals] == [(), (), (4 * NS_PER_S,)]
+
+
+@pytest.mark.parametrize(
+    ("check", "credit", "words"),
+    [
+        (SendsGoals(ACTION), 1, "2 goals, as expected"),
+        (SendsGoals(ACTION, ({"order": 5}, {"order": 6})), 1, "as expected"),
+        (SendsGoals(ACTION, ({"order": 6},)), 0, "t = 1.000 s, /count, goal 1: order is 5, expected 6"),
+        (SendsGoals(ACTION, every={"order": 5}), 0, "goal 2: order is 6, expected 5"),
+        (SendsGoals(ACTION, at_least=3), 0, "2 goals, expected at least 3"),
+        (SendsGoals(ACTION, at_most=1), 0, "2 goals, expected at least 1 and at most 1"),
+        (SendsGoals(ACTION, one_at_a_time=True), 0, "t = 2.000 s, /count: a goal is sent while the one before runs"),
+    ],
+)
+def test_what_is_sent(check: SendsGoals, credit: float, words: str) -> None:
+    """Content, number and turn."""
+    earned, reason = found(check, client().goal(1, 1, 5).goal(2, 2, 6).result(3, 1, "succeeded"))
+    assert (earned, words in reason) == (credit, True), reason
+
+
+def test_one_after_the_other() -> None:
+    """As soon as the result is there."""
+    recording = client().goal(1, 1, 5).result(2, 1, "succeeded").goal(2, 2, 6)
+    assert found(SendsGoals(ACTION, one_at_a_time=True), recording)[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("asked", "credit", "words"),
+    [
+        ((5.2,), 1, "1 goal cancelled in time"),
+        ((6.5,), 0, "the goal had to be cancelled, and was only 1.500 s later"),
+        ((), 0, "t = 5.000 s, /count: the goal had to be cancelled, and was never"),
+        ((4.0,), 0, "t = 4.000 s, /count: the goal was cancelled too early"),
+    ],
+)
+def test_a_goal_is_cancelled_at_a_feedback(asked: tuple[float, ...], credit: float, words: str) -> None:
+    """Not before, and soon."""
+    recording = client().goal(1, 1, 5).feedback(3, 1, 1).feedback(5, 1, 3)
+    for t_s in asked:
+        recording.cancel(t_s, 1).result(t_s, 1, "canceled")
+    earned, reason = found(CancelsGoal(ACTION, {"sequence[0]": 3}), recording)
+    assert (earned, words in reason) == (credit, True), reason
+
+
+def test_a_goal_may_be_cancelled_after_a_time() -> None:
+    """Counted from the acceptance; one that ends before need not be."""
+    check = CancelsGoal(ACTION, after=2 * NS_PER_S, within=500 * NS_PER_MS)
+    recording = (
+        client().goal(1, 1, 5).result(2, 1, "succeeded").goal(4, 2, 6).cancel(6.25, 2).result(6.25, 2, "canceled")
+    )
+    assert found(check, recording)[0] == 1
+    assert [reading.value for reading in check.judge(recording.trace()).readings] == [0.25]
+    ended = client().goal(1, 1, 5).result(2, 1, "succeeded")
+    assert "0 goals came to the moment to cancel, expected at least 1" in found(check, ended)[1]
+
+
+@pytest.mark.parametrize(
+    ("then", "order", "t_s", "credit", "words"),
+    [
+        ("same", 5, 3, 1, "the same goal again after 1 goal that was rejected"),
+        ("same", 6, 3, 0, "another one was sent"),
+        ("next", 6, 3, 1, "another goal after 1 goal"),
+        ("next", 5, 3, 0, "the same one was sent again"),
+        ("goal", 6, 4.5, 0, "the next one was sent only after 2.500 s"),
+        ("goal", 6, None, 0, "t = 2.000 s, /count: goal 1 was rejected, then no goal was sent"),
+        ("nothing", 6, None, 1, "no goal after 1 goal"),
+        ("nothing", 6, 3, 0, "a goal was sent at t = 3.000 s"),
+        ("nothing", 6, 5, 1, "no goal after 1 goal"),
+    ],
+)
+def test_what_follows_a_goal(then: Any, order: int, t_s: float | None, credit: float, words: str) -> None:
+    """The same one, another one, any, or none."""
+    recording = client().goal(2, 1, 5, accepted=False)
+    if t_s is not None:
+        recording.goal(t_s, 2, order)
+    earned, reason = found(AfterGoal(ACTION, "rejected", then), recording)
+    assert (earned, words in reason) == (credit, True), reason
+
+
+def test_only_the_first_ones_count_where_the_rubric_says_so() -> None:
+    """And what ends shortly before the recording does is not judged."""
+    recording = client(10).goal(1, 1, 5).result(2, 1, "succeeded").goal(2.5, 2, 6).result(4, 2, "succeeded")
+    assert found(AfterGoal(ACTION, "succeeded"), recording)[0] == 0
+    check = AfterGoal(ACTION, "succeeded", first=1)
+    assert found(check, recording)[0] == 1
+    assert [reading.value for reading in check.judge(recording.trace()).readings] == [0.5]
+    late = client(10).goal(1, 1, 5).result(9, 1, "succeeded")
+    assert "0 goals succeeded in time, expected at least 1" in found(AfterGoal(ACTION, "succeeded"), late)[1]
+
+
+@pytest.mark.parametrize("check", [SendsGoals(ACTION), CancelsGoal(ACTION), AfterGoal(ACTION, "aborted")])
+def test_why_no_goal_came(check: SendsGoals | CancelsGoal | AfterGoal) -> None:
+    """No client, one of another action, one that is silent, a crash; without the stimulus the rubric is wrong."""
+
+    def why(recording: Recording) -> tuple[ProblemKind | None, str]:
+        finding = check.judge(recording.trace())
+        return finding.problem.kind if finding.problem else None, finding.hint
+
+    assert why(client())[0] is ProblemKind.ABSENT
+    other = client().service("client", "/cout/_action/send_goal", f"{TYPE}_SendGoal")
+    assert why(other) == (ProblemKind.OTHER_NAME, "name the action /count instead of /cout")
+    silent = client().service("client", f"{ACTION}/_action/send_goal", f"{TYPE}_SendGoal")
+    assert why(silent)[0] is ProblemKind.SILENT
+    crashed = check.judge(client().crashed(1).trace())
+    assert "fault" in crashed.evidence
+    with pytest.raises(HarnessError):
+        check.judge(Recording(5).trace())
+
+
+def test_a_student_may_send_anything() -> None:
+    """Requests without the fields that they should have."""
+    recording = client()
+    odd: list[dict[str, Any]] = [{}, {"goal_id": 1, "goal": 2}, {"goal_id": {"uuid": "x"}, "goal": {}}]
+    for number, value in enumerate(odd, 1):
+        recording.request(number, f"{ACTION}/_action/send_goal", number, "student", value, f"{TYPE}_SendGoal")
+    trace: Trace = recording.trace()
+    assert [goal.content for goal in sent_goals(trace, ACTION)] == [{}, {}, {}]
+    assert SendsGoals(ACTION, ({"order": 5},)).judge(trace).credit == 0
