@@ -32,23 +32,23 @@ def test_a_student_is_graded_by_their_own_values_and_sees_only_what_is_open(
     text = text.replace("linear.x: 0.5,", "linear.x: {variant: speed},")
     waits = "    title: Turns at 0.1 rad/s\n    feedback: {show: nothing, until: 2026-12-01}\n"
     (tmp_path / "r.yaml").write_text(text.replace("    title: Turns at 0.1 rad/s\n", waits), encoding="utf-8")
-    (tmp_path / "course.key").write_text("a course key of enough bytes\n", encoding="utf-8")
-    sheet = run("rubric", "variant", "r.yaml", "--variant-key", "course.key", "--student", "Ada", "--format", "json")
+    (tmp_path / "variant.key").write_text("a variant key of enough bytes\n", encoding="utf-8")
+    sheet = run("rubric", "variant", "r.yaml", "--variant-key", "variant.key", "--student", "Ada", "--format", "json")
     values = json.loads(sheet.stdout)["values"]
     program = SOLUTION.read_text(encoding="utf-8")
     program = program.replace("RATE_HZ = 20", f"RATE_HZ = {values['rate'].split()[0]}")
     program = program.replace("FORWARD_MPS = 0.5", f"FORWARD_MPS = {values['speed']}")
     (tmp_path / "velocity_publisher.py").write_text(program, encoding="utf-8")
 
-    whose = ["--rubric", "r.yaml", "--student", "ada ", "--variant-key", "course.key"]
+    whose = ["--rubric", "r.yaml", "--student", "ada ", "--variant-key", "variant.key"]
     graded = run("velocity_publisher.py", *whose, "-o", "json=graded.json", "-o", "evidence=kept", "--no-progress")
     report = json.loads((tmp_path / "graded.json").read_text(encoding="utf-8"))
     assert (graded.exit_code, report["score"], report["max_score"]) == (0, 30, 30)
     jsonschema.validate(report, report_schema())
     assert report["exercises"][0]["variant"] == {"student": "ada", "values": values}
-    assert report["reproduce"]["command"].endswith("--student ada --variant-key course.key")
+    assert report["reproduce"]["command"].endswith("--student ada --variant-key variant.key")
 
-    (tmp_path / "course.key").unlink()
+    (tmp_path / "variant.key").unlink()
     assert run("rejudge", "kept", "--rubric", "r.yaml", "-o", "json=again.json").exit_code == 0
     assert (tmp_path / "again.json").read_bytes() == (tmp_path / "graded.json").read_bytes()
 

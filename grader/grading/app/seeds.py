@@ -54,7 +54,7 @@ def checked_key(key: bytes, where: str) -> bytes:
     """Check the length of a key; the message of the KeyFileError reveals nothing else about it."""
     if not LEAST_BYTES <= len(key) <= MOST_BYTES:
         found = f"more than {MOST_BYTES}" if len(key) > MOST_BYTES else str(len(key))
-        hint = "make one: head -c 32 /dev/urandom | base64 > course.key"
+        hint = "make one: head -c 32 /dev/urandom | base64 > secret.key"
         raise KeyFileError(f"{where}: expected a key of {LEAST_BYTES} to {MOST_BYTES} bytes, found {found}", hint)
     return key
 

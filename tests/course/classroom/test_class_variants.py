@@ -34,12 +34,12 @@ def class_(tmp_path: Path) -> Callable[..., Any]:
     """Return what grades a class by a rubric with a variant; the scheduler beside it remembers the tasks."""
     hand_in(tmp_path / "in", ada=10, bob=4, eve=5)
     (tmp_path / "roster.csv").write_text(ROSTER, encoding="utf-8")
-    (tmp_path / "course.key").write_text("a course key of enough bytes\n", encoding="utf-8")
+    (tmp_path / "variant.key").write_text("a variant key of enough bytes\n", encoding="utf-8")
     text = builtin_rubrics()["velocity_publisher"].read_text(encoding="utf-8")
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {between: [5 Hz, 500 Hz], step: 1 Hz}\nscenarios:", 1)
     (tmp_path / "r.yaml").write_text(text.replace("rate: 20 Hz,", "rate: {variant: rate},"), encoding="utf-8")
 
-    def run(*, key: str = "course.key", roster: str = "roster.csv") -> tuple[Graded, FakeScheduler]:
+    def run(*, key: str = "variant.key", roster: str = "roster.csv") -> tuple[Graded, FakeScheduler]:
         scheduler = FakeScheduler()
         grading = replace(GRADING, rubrics=(tmp_path / "r.yaml",), variant_key=tmp_path / key if key else None)
         wanted = course(tmp_path / "in", tmp_path / "out", roster=tmp_path / roster if roster else None)
@@ -53,7 +53,7 @@ def test_everybody_is_graded_by_their_own_values(class_: Callable[..., Any], tmp
     _, scheduler = class_()
     found = {name: task.conditions for name, task in scheduler.tasks.items()}
     assert {name: conditions.variants.student for name, conditions in found.items()} == {"ada": "17", "bob": "bob"}
-    sheet = read_rubric(tmp_path / "r.yaml", draw=by_key(tmp_path / "course.key", "17"))
+    sheet = read_rubric(tmp_path / "r.yaml", draw=by_key(tmp_path / "variant.key", "17"))
     assert sheet.variant is not None
     assert found["ada"].variants == Drawn("17", {"velocity_publisher": dict(sheet.variant.values)})
     assert found["ada"].rubrics == (("velocity_publisher", sheet.digest),)
@@ -72,7 +72,7 @@ def test_results_stay_until_the_values_change(class_: Callable[..., Any], tmp_pa
     """The same command grades nothing again; another variant key means other values."""
     class_()
     assert class_()[0].graded == 0
-    (tmp_path / "course.key").write_text("another course key of enough bytes\n", encoding="utf-8")
+    (tmp_path / "variant.key").write_text("another variant key of enough bytes\n", encoding="utf-8")
     assert class_()[0].graded == 2
 
 
@@ -93,10 +93,10 @@ def test_the_process_that_grades_gets_the_values_and_not_the_key(tmp_path: Path)
         raise HarnessError("enough")
 
     own = Drawn("17", {"velocity_publisher": {"rate": "7 Hz"}})
-    conditions = Conditions("0", (), "", GradingOptions(variant_key=tmp_path / "course.key"), variants=own)
+    conditions = Conditions("0", (), "", GradingOptions(variant_key=tmp_path / "variant.key"), variants=own)
     task = Task("x", "x", tmp_path, tmp_path / "into", conditions, 1, False, 60.0)
     status = worker.attempt(task, lambda step: None, refuse)
     (request,) = heard
     assert isinstance(request.draw, Recorded)
-    assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "course.key", own)
+    assert (request.student, request.variant_key, request.draw.drawn) == ("17", tmp_path / "variant.key", own)
     assert status.state is State.FAILED

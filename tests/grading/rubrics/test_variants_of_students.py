@@ -74,7 +74,7 @@ def test_a_key_is_read_without_the_line_break_behind_it(tmp_path: Path) -> None:
 )
 def test_a_key_that_cannot_be_used_is_refused(tmp_path: Path, content: bytes | None, found: str) -> None:
     """One that could be guessed would tell students each other's values."""
-    path = tmp_path / "course.key"
+    path = tmp_path / "variant.key"
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(KeyFileError, match=found) as refusal:
@@ -90,10 +90,10 @@ def sheet(tmp_path: Path) -> Callable[..., Result]:
     text = builtin_rubrics()["velocity_publisher"].read_text(encoding="utf-8")
     text = text.replace("\nscenarios:", "\nvariants:\n  rate: {choose: [10 Hz, 15 Hz, 20 Hz]}\nscenarios:", 1)
     (tmp_path / "r.yaml").write_text(text.replace("rate: 20 Hz,", "rate: {variant: rate},"), encoding="utf-8")
-    (tmp_path / "course.key").write_bytes(KEY)
+    (tmp_path / "variant.key").write_bytes(KEY)
 
     def run(*more: str) -> Result:
-        words = ["rubric", "variant", str(tmp_path / "r.yaml"), "--variant-key", str(tmp_path / "course.key"), *more]
+        words = ["rubric", "variant", str(tmp_path / "r.yaml"), "--variant-key", str(tmp_path / "variant.key"), *more]
         return CliRunner().invoke(app, words)
 
     return run
