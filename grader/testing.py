@@ -27,6 +27,7 @@ from grader.grading.model.report import Verdict
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S, nanoseconds
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Delivery,
     Endpoint,
@@ -271,11 +272,11 @@ class TraceBuilder:
         """Add an event of the scenario itself; `Mark` lists the names."""
         return self.add(Mark(nanoseconds(t_s), name, detail))
 
-    def trace(self, scenario: str = "alone") -> Trace:
+    def trace(self, scenario: str = "alone") -> AssessedTrace:
         """Return the trace, with its observations in the order of a recording."""
         graph = self._graph()
         ordered = sorted([*self._seen, *graph], key=lambda seen: (seen.t_ns, _PHASE.get(type(seen), 3)))
-        return Trace(scenario, self.clock, nanoseconds(self.stop_s), tuple(ordered))
+        return AssessedTrace(scenario, self.clock, nanoseconds(self.stop_s), tuple(ordered))
 
     def _times(self, rate_hz: float, start_s: float, stop_s: float | None) -> list[int]:
         start_ns, stop_ns = nanoseconds(start_s), nanoseconds(self.stop_s if stop_s is None else stop_s)

@@ -16,7 +16,7 @@ from grader.runtime.domains import domains_of
 from grader.runtime.model.checkup import Property
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.projects import Project
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.programs.shares import install_shares
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.choose import OWN_PROGRAMS, Machine, TierChoice, choose_isolation
@@ -87,11 +87,11 @@ class RecordingSession:
         jobs: Mapping[Key, Job],
         clock: str,
         progress: Callable[[str], None],
-        finished: Callable[[Key, Trace], None] | None = None,
+        finished: Callable[[Key, AssessedTrace], None] | None = None,
         *,
         budget: RealTimeBudget | None = None,
         on_wall: bool = True,
-    ) -> dict[Key, Trace]:
+    ) -> dict[Key, AssessedTrace]:
         """Record jobs and return their traces, in the same order.
 
         With `auto`, a job that virtual time does not suit is recorded again; see `next_recording`. On the wall clock,
@@ -113,15 +113,15 @@ class RecordingSession:
         from grader.runtime.supervisor.unrunnable import trace_without_run  # noqa: PLC0415
 
         budget = budget or RealTimeBudget()
-        traces: dict[Key, Trace] = {}
+        traces: dict[Key, AssessedTrace] = {}
 
-        def tell(key: Key, trace: Trace) -> None:
+        def tell(key: Key, trace: AssessedTrace) -> None:
             trace = replace(trace, other_numpy=other_numpy(self.ros.distro))
             traces[key] = with_newer(trace, jobs[key].plan.root, self.ros.distro) if trace.faults() else trace
             if finished is not None:
                 finished(key, traces[key])
 
-        made: dict[Key, list[tuple[NextRecording, Trace]]] = {}
+        made: dict[Key, list[tuple[NextRecording, AssessedTrace]]] = {}
         wanted: dict[Key, NextRecording] = {}
 
         def go_on(key: Key) -> None:
@@ -156,7 +156,7 @@ class RecordingSession:
         jobs: Mapping[Key, TestJob],
         progress: Callable[[str], None],
         budget: RealTimeBudget | None = None,
-    ) -> dict[Key, Trace]:
+    ) -> dict[Key, AssessedTrace]:
         """Run tests of rubrics and return their traces, in the same order; raises EnvironmentFault without pytest."""
         return record_tests(self.recorder, jobs, progress, budget)
 

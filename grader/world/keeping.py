@@ -10,7 +10,7 @@ from grader.grading.app.grade import environment_of
 from grader.grading.judging.figures import playback
 from grader.grading.reporting.html.render import render_run
 from grader.runtime.files import write_whole
-from grader.runtime.model.trace import Delivery, Fault, LogRecord, Message, Observation, OutputLine, Trace
+from grader.runtime.model.trace import AssessedTrace, Delivery, Fault, LogRecord, Message, Observation, OutputLine
 from grader.runtime.recording.recording_file import recording_bytes
 from grader.runtime.serialization import carried_fields
 from grader.runtime.session import RecordingSession
@@ -20,7 +20,7 @@ SENDERS = {"grader": "test", "student": "program"}
 RECORDING, PAGE = "recording.mcap", "run.html"
 
 
-def keep(session: RecordingSession, trace: Trace, seed: int | None, folder: Path, why: str) -> list[Path]:
+def keep(session: RecordingSession, trace: AssessedTrace, seed: int | None, folder: Path, why: str) -> list[Path]:
     """Write the recording and the page of a run into a folder, and return their paths.
 
     Args:
@@ -43,7 +43,7 @@ def keep(session: RecordingSession, trace: Trace, seed: int | None, folder: Path
     return [folder / RECORDING, folder / PAGE]
 
 
-def page_of(session: RecordingSession, trace: Trace, seed: int | None, why: str = "") -> str:
+def page_of(session: RecordingSession, trace: AssessedTrace, seed: int | None, why: str = "") -> str:
     """Return the page that plays a run, in one file; the arguments are those of `keep`."""
     environment = environment_of(session)
     facts = {} if seed is None else {"seed": str(seed)}
@@ -54,7 +54,7 @@ def page_of(session: RecordingSession, trace: Trace, seed: int | None, why: str 
     return render_run(trace.scenario, why, replace(run, topics=topics), facts)
 
 
-def _whole(trace: Trace) -> Trace:
+def _whole(trace: AssessedTrace) -> AssessedTrace:
     """Return a trace with the fields of its messages."""
     return replace(trace, observations=tuple(map(_with_fields, trace.observations)))
 

@@ -21,6 +21,7 @@ from grader.runtime.model.errors import GraderError, RecordingError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import GIB, MIB, NS_PER_S, seconds
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Endpoint,
     Fault,
@@ -32,7 +33,6 @@ from grader.runtime.model.trace import (
     Offer,
     OutputLine,
     Response,
-    Trace,
 )
 from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
 from grader.runtime.programs.executables import package_of
@@ -982,10 +982,10 @@ class World:
 
     # ------------------------------------------------------------- recording
 
-    def trace(self) -> Trace:
+    def trace(self) -> AssessedTrace:
         """Return what was observed so far as a trace, as checks of a rubric read it."""
         now_ns = self._run.now_ns + 1
-        return Trace(
+        return AssessedTrace(
             self._plan.scenario,
             self._clock,
             stop_ns=now_ns,

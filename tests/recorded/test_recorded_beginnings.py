@@ -16,14 +16,23 @@ from grader.grading.evidence.store import run_from
 from grader.grading.judging.agreement import observation_start
 from grader.grading.judging.beginnings import CUTS_NS, BeginningJudge, Comparison, cut
 from grader.runtime.model.quantities import NS_PER_MS
-from grader.runtime.model.trace import ClockKind, LogRecord, Message, Observation, OutputLine, Request, Response, Trace
+from grader.runtime.model.trace import (
+    AssessedTrace,
+    ClockKind,
+    LogRecord,
+    Message,
+    Observation,
+    OutputLine,
+    Request,
+    Response,
+)
 from grader.runtime.recording.packed import unpack_trace
 
 #: How late what a node does is noticed at most, and how long messages are lost at the start.
 LATE_NS, LOST_NS = 25 * NS_PER_MS, 300 * NS_PER_MS
 
 
-def scenarios(recorded: Recorded) -> Iterator[tuple[str, BeginningJudge, Trace, str]]:
+def scenarios(recorded: Recorded) -> Iterator[tuple[str, BeginningJudge, AssessedTrace, str]]:
     """Yield what was recorded in virtual time: its name, its judge, the trace, and the topic that it begins with."""
     manifest = kept.parse_manifest(recorded.manifest)
     exercises = [exercises_by_id()[exercise.id] for exercise in manifest.exercises]
@@ -42,14 +51,14 @@ def scenarios(recorded: Recorded) -> Iterator[tuple[str, BeginningJudge, Trace, 
                 yield f"{exercise.id} {scenario.id}", judge, trace, scenario.span.after_first_message_on or ""
 
 
-def begins_ns(trace: Trace, first_message_on: str) -> int:
+def begins_ns(trace: AssessedTrace, first_message_on: str) -> int:
     """Return when the program has something to do."""
     given = [mark.t_ns for name in ("stream_starts", "server_starts") for mark in trace.marks(name)]
     given += [request.t_ns for request in trace.of(Request) if request.sender == "grader"]
     return observation_start(trace, first_message_on) if first_message_on else min(given, default=0)
 
 
-def on_a_real_clock(trace: Trace, seed: int) -> Trace:
+def on_a_real_clock(trace: AssessedTrace, seed: int) -> AssessedTrace:
     """Return a recording with jitter, without the messages that were sent before anybody could hear them."""
     chance = random.Random(seed)
     lost_ns = LOST_NS if seed % 2 else 0

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from grader.runtime.model.trace import ClockKind, Message, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Message
 from grader.runtime.plan import Plan
 from grader.runtime.session import AUTO, VIRTUAL, WALL, RecordingSession
 from grader.runtime.supervisor.next_recording import CHARGED_NOTE, DRIFTS, UNCLEAR
@@ -23,15 +23,15 @@ class Recorder:
         self.unfit, self.broken = unfit, broken
         self.recorded: list[tuple[str, str]] = []
 
-    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[AssessedTrace]:
         for job in jobs:
             scenario, clock = job.plan.scenario, ClockKind(job.plan.clock)
             self.recorded.append((scenario, clock.value))
             reason = "it is busy" if scenario in self.unfit and clock is ClockKind.VIRTUAL else ""
             problem = "lost" if scenario in self.broken else ""
-            yield Trace(scenario, clock, 1, (), clock_reason=reason, harness_problem=problem)
+            yield AssessedTrace(scenario, clock, 1, (), clock_reason=reason, harness_problem=problem)
 
-    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
+    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[AssessedTrace]:
         return list(self.each(jobs, progress))
 
 
@@ -48,9 +48,11 @@ def session_of(recorder: Recorder) -> RecordingSession:
     return session
 
 
-def recorded(recorder: Recorder, clock: str, *scenarios: str) -> tuple[list[tuple[str, Trace]], dict[str, Trace]]:
+def recorded(
+    recorder: Recorder, clock: str, *scenarios: str
+) -> tuple[list[tuple[str, AssessedTrace]], dict[str, AssessedTrace]]:
     """Return what was heard, in order, and the traces at the end."""
-    heard: list[tuple[str, Trace]] = []
+    heard: list[tuple[str, AssessedTrace]] = []
     session = session_of(recorder)
     jobs = {name: job(name) for name in scenarios}
     traces = session.record(jobs, clock, lambda step: None, lambda key, trace: heard.append((key, trace)))
@@ -87,7 +89,7 @@ def test_the_first_look_may_end_early_only_if_there_is_a_second() -> None:
     plans: list[bool] = []
 
     class Listening(Recorder):
-        def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+        def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[AssessedTrace]:
             plans.extend(job.plan.stop_when_unfit for job in jobs)
             return super().each(jobs, progress)
 
@@ -101,7 +103,7 @@ def test_all_recordings_of_a_submission_share_one_budget() -> None:
     budgets: list[Any] = []
 
     class Listening(Recorder):
-        def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+        def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[AssessedTrace]:
             budgets.extend(job.budget for job in jobs)
             yield from super().each(jobs, progress)
 
@@ -127,7 +129,7 @@ class PacedRecorder:
         self.wall_ms, self.sure_ms, self.busy = wall_ms, sure_ms, busy
         self.recorded: list[str] = []
 
-    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[AssessedTrace]:
         for job in jobs:
             clock = ClockKind(job.plan.clock)
             charged = job.plan.charged
@@ -137,7 +139,7 @@ class PacedRecorder:
             if charged:
                 period_ms = next(self.charged_ms) if charged == 1 else self.sure_ms
             messages = tuple(Message(t * 10**6, "/x", "T", {}, b"") for t in range(0, 3000, period_ms))
-            yield Trace(
+            yield AssessedTrace(
                 job.plan.scenario,
                 clock,
                 3 * 10**9,
@@ -147,11 +149,11 @@ class PacedRecorder:
                 may_drift=not wall,
             )
 
-    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
+    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[AssessedTrace]:
         return list(self.each(jobs, progress))
 
 
-def decided(recorder: PacedRecorder, clock: str = AUTO) -> Trace:
+def decided(recorder: PacedRecorder, clock: str = AUTO) -> AssessedTrace:
     """Return the trace of the node, which has to be heard of once."""
     heard: list[str] = []
     make: Any = RecordingSession
@@ -204,7 +206,7 @@ def test_a_failure_of_the_machine_makes_no_node_surely_slow() -> None:
     """What was not recorded with less work says nothing about the pace."""
 
     class Failing(PacedRecorder):
-        def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+        def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[AssessedTrace]:
             for job, trace in zip(jobs, super().each(jobs, progress), strict=True):
                 failed = 0 < job.plan.charged < 1
                 yield replace(trace, observations=(), harness_problem="no worker") if failed else trace

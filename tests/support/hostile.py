@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.runtime.model.limits import Limits
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 from grader.runtime.supervisor.supervisor import Job
@@ -91,7 +91,7 @@ def staging(session: RecordingSession) -> RecordingSession:
     """Have a session copy what is recorded into its own folder, because workers see no other."""
     each = session.recorder.each
 
-    def each_staged(jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+    def each_staged(jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[AssessedTrace]:
         root = Path(tempfile.mkdtemp(dir=session.folder))
         for number, job in enumerate(jobs):
             shutil.copytree(job.plan.root, root / str(number))
@@ -126,12 +126,12 @@ def planned(folder: Path, *programs: str, limits: Limits | None = None, **fields
     return Plan(**{**usual, **fields})
 
 
-def record(session: RecordingSession, folder: Path, *programs: str, **fields: Any) -> Trace:
+def record(session: RecordingSession, folder: Path, *programs: str, **fields: Any) -> AssessedTrace:
     """Record programs together, as `planned` and `recorded` say."""
     return recorded(session, planned(folder, *programs, **fields))
 
 
-def recorded(session: RecordingSession, plan: Plan) -> Trace:
+def recorded(session: RecordingSession, plan: Plan) -> AssessedTrace:
     """Record a plan; on the wall clock again while other tests keep the machine busy."""
     for _ in range(BUSY_TRIES):
         trace = session.recorder.record([Job("hostile", plan)], lambda step: None)[0]
@@ -140,6 +140,6 @@ def recorded(session: RecordingSession, plan: Plan) -> Trace:
     return trace
 
 
-def printed(trace: Trace) -> list[str]:
+def printed(trace: AssessedTrace) -> list[str]:
     """Return the lines that programs wrote to standard output."""
     return [line.text for line in trace.lines() if line.stream == "stdout"]

@@ -21,6 +21,7 @@ from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.checkup import Property
 from grader.runtime.model.submission import StudentFile, Submission
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Delivery,
     Endpoint,
@@ -38,7 +39,6 @@ from grader.runtime.model.trace import (
     ServiceEnd,
     Start,
     StartWay,
-    Trace,
 )
 from grader.runtime.recording.recording_file import encode
 
@@ -103,7 +103,7 @@ OBSERVATIONS: Mapping[type, st.SearchStrategy[Any]] = {
     Mark: st.builds(Mark, _TIMES, _TEXTS, _TEXTS),
 }
 TRACES = st.builds(
-    Trace,
+    AssessedTrace,
     scenario=_TEXTS,
     clock=st.sampled_from(ClockKind),
     stop_ns=_TIMES,
@@ -129,7 +129,7 @@ def twist_message(t_ns: int, forward: float = 0.5) -> Message:
     return Message(t_ns, "/cmd_vel", TWIST, value, encode(TWIST, value))
 
 
-def velocity_trace(forward: float = 0.5, rate_hz: int = 20) -> Trace:
+def velocity_trace(forward: float = 0.5, rate_hz: int = 20) -> AssessedTrace:
     """A node that does what it should, or nearly."""
     end = Endpoint("publisher", "/cmd_vel", TWIST, "/node", 0, "reliable", "volatile", 10)
     observations: list[Observation] = [
@@ -138,10 +138,10 @@ def velocity_trace(forward: float = 0.5, rate_hz: int = 20) -> Trace:
         OutputLine(0, "velocity_publisher.py", "stdout", "hello"),
     ]
     observations += [twist_message(10**9 // rate_hz * i, forward) for i in range(10 * rate_hz)]
-    return Trace("alone", ClockKind.VIRTUAL, 10**10, tuple(observations), notes=("a note",))
+    return AssessedTrace("alone", ClockKind.VIRTUAL, 10**10, tuple(observations), notes=("a note",))
 
 
-def velocity_run(trace: Trace | None = None, *, name: str = "ada", source: str = "import rclpy\n") -> Run:
+def velocity_run(trace: AssessedTrace | None = None, *, name: str = "ada", source: str = "import rclpy\n") -> Run:
     file = StudentFile("velocity_publisher.py", "velocity_publisher.py" if trace else None)
     return Run(
         submission=Submission(name, f"class/{name}", Path("nowhere"), "sha256:" + "a" * 64, {file.wanted: file}),

@@ -9,6 +9,7 @@ from typing import Any
 
 from grader.runtime.model.quantities import nanoseconds
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Delivery,
     Endpoint,
@@ -23,7 +24,6 @@ from grader.runtime.model.trace import (
     Request,
     Response,
     ServiceEnd,
-    Trace,
 )
 from grader.runtime.worker.ending import exited
 
@@ -155,9 +155,9 @@ class Recording:
     def mark(self, t_s: float, name: str, detail: str) -> Recording:
         return self.add(Mark(nanoseconds(t_s), name, detail))
 
-    def trace(self, scenario: str = "alone", **rest: Any) -> Trace:
+    def trace(self, scenario: str = "alone", **rest: Any) -> AssessedTrace:
         ordered = sorted(self.items, key=lambda o: (o.t_ns, _PHASE.get(type(o), 3)))
-        return Trace(scenario, self.clock, nanoseconds(self.stop_s), tuple(ordered), **rest)
+        return AssessedTrace(scenario, self.clock, nanoseconds(self.stop_s), tuple(ordered), **rest)
 
 
 def twist(linear: Sequence[float] = (0.5, 0, 0), angular: Sequence[float] = (0, 0, 0.1)) -> dict[str, Any]:

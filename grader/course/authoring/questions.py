@@ -13,7 +13,7 @@ from grader.grading.model.report import TopicSummary
 from grader.grading.model.wording import number
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S, counted, seconds
-from grader.runtime.model.trace import Delivery, Message, Offer, Trace
+from grader.runtime.model.trace import AssessedTrace, Delivery, Message, Offer, Trace
 
 #: What every node has.
 _EVERYBODYS = ("use_sim_time", "start_type_description_service")
@@ -148,8 +148,8 @@ _MOST_FIELDS = 8
 class Seen:
     """The observed behaviour of a reference solution."""
 
-    alone: Trace  # trace of the nodes without stimuli
-    driven: Trace  # trace of the nodes with the stimuli of the draft; the same as `alone` if there are none
+    alone: AssessedTrace  # trace of the nodes without stimuli
+    driven: AssessedTrace  # trace of the nodes with the stimuli of the draft; the same as `alone` if there are none
     files: tuple[str, ...]
     window_s: float  # longest time that every topic was observed after its first message
 

@@ -40,7 +40,7 @@ from grader.grading.submissions.submission import stage_submission
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.model.wording import printable
 from grader.runtime.plan import Surroundings
 from grader.runtime.session import Job, RecordingSession, TestJob, open_session, planned_clock
@@ -68,10 +68,10 @@ class TrialRunner:
     reference: Submission
     sources: Mapping[str, str]
     progress: Progress
-    traces: dict[str, Trace] = field(default_factory=dict)
+    traces: dict[str, AssessedTrace] = field(default_factory=dict)
     recordings: int = 0
 
-    def grade(self, submission: Submission) -> tuple[TrialResult, dict[str, Trace]]:
+    def grade(self, submission: Submission) -> tuple[TrialResult, dict[str, AssessedTrace]]:
         """Grade a complete submission; the traces are those of its scenarios."""
         jobs = plan_jobs([self.exercise], submission, self.around)
         recorded = self.session.record(jobs, self.request.clock, self.progress)
@@ -110,7 +110,7 @@ class TrialRunner:
     def _tests(self, submission: Submission) -> Mapping[tuple[str, str], TestJob]:
         return plan_tests([self.exercise], submission, self.around)
 
-    def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, Trace]) -> TrialResult:
+    def _judged(self, candidate: Candidate, submission: Submission, own: Mapping[str, AssessedTrace]) -> TrialResult:
         sources = {**self.sources, candidate.file: candidate.source}
         return result_of(judge_exercise(self.exercise, {**self.traces, **own}, submission, sources))
 

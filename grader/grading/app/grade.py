@@ -30,7 +30,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, SubmissionError
 from grader.runtime.model.releases import TRIED
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.model.wording import listed, printable
 from grader.runtime.plan import Surroundings, derive, known_programs, plan_scenario
 from grader.runtime.session import (
@@ -69,7 +69,7 @@ class EarlyReports:
         self._traces = dict(run.traces)
         self._started = time.perf_counter()
 
-    def take(self, key: Key, trace: Trace) -> None:
+    def take(self, key: Key, trace: AssessedTrace) -> None:
         """Take a recording; make a partial report if it completes its exercise but not the whole run."""
         self._traces[key] = trace
         self._awaited.discard(key)
@@ -143,7 +143,7 @@ class Preparation:
     around: Surroundings
     played: str = ""
     provided: Provided = Provided()
-    kept: Mapping[Key, Trace] = field(default_factory=dict)
+    kept: Mapping[Key, AssessedTrace] = field(default_factory=dict)
     reaches: tuple[str, ...] = ()
 
     @property
@@ -289,7 +289,7 @@ def _judge_of(
 
 def _record_checks(
     session: RecordingSession, progress: Progress, budget: RealTimeBudget, jobs: Sequence[Job]
-) -> Sequence[Trace]:
+) -> Sequence[AssessedTrace]:
     return session.recorder.record([replace(job, budget=budget) for job in jobs], progress)
 
 

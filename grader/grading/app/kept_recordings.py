@@ -8,7 +8,7 @@ from grader.grading.evidence.manifest import scenario_digest
 from grader.grading.evidence.store import Evidence, run_of
 from grader.grading.model.exercise import Exercise, recordings_in
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ def recorded_alike(evidence: Evidence, exercises: Sequence[Exercise], planned: P
     )
 
 
-def kept_traces(evidence: Evidence, exercises: Sequence[Exercise]) -> Mapping[tuple[str, str], Trace]:
+def kept_traces(evidence: Evidence, exercises: Sequence[Exercise]) -> Mapping[tuple[str, str], AssessedTrace]:
     """Read the recordings of these exercises; raises EvidenceError for a changed or damaged one."""
     wanted = {(exercise.id, scenario.id) for exercise in exercises for scenario in exercise.scenarios}
     return {key: trace for key, trace in run_of(evidence, exercises).traces.items() if key in wanted}

@@ -24,7 +24,7 @@ from grader.runtime.model.limits import MOST_LAUNCHED, Limits
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import RunOptions, Scenario, Span, is_launch_file
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.plan import Surroundings, plan_scenario
 from grader.runtime.session import AUTO, VIRTUAL, Job, RecordingSession, open_session, planned_clock
 from grader.runtime.stimuli import RecordedStream
@@ -53,7 +53,7 @@ class ObserveRequest:
 class Watched:
     """The observed behaviour of the nodes."""
 
-    trace: Trace
+    trace: AssessedTrace
     processes: tuple[str, ...]  # file names of the processes
     isolation: str
     sources: Mapping[str, str] = field(default_factory=dict)  # the text of their files, and of those that faults name
@@ -117,8 +117,8 @@ _TOO_BUSY = "recorded in virtual time, which hides how slow a program is, becaus
 
 
 def _in_virtual_time(
-    session: RecordingSession, scenario: Scenario, job: Job, held_up: Trace, progress: Progress
-) -> Trace:
+    session: RecordingSession, scenario: Scenario, job: Job, held_up: AssessedTrace, progress: Progress
+) -> AssessedTrace:
     """Return a whole recording in virtual time where there is none on the wall clock, with the reason; or that one."""
     again = replace(job, title="observing in virtual time")
     whole = session.record({scenario.id: again}, VIRTUAL, progress)[scenario.id]
@@ -128,7 +128,7 @@ def _in_virtual_time(
     return replace(whole, clock_reason="", notes=(f"{_TOO_BUSY} clock{why}", *whole.notes))
 
 
-def _sources(trace: Trace, submission: Submission) -> dict[str, str]:
+def _sources(trace: AssessedTrace, submission: Submission) -> dict[str, str]:
     """Return the text of the programs and of the files that faults name, by path; none for one that is not text."""
     named = {fault.file for fault in trace.faults()} | {start.file for start in trace.starts}
     named |= {file.found for file in submission.files.values() if file.found}

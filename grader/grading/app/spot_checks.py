@@ -14,7 +14,7 @@ from grader.grading.judging.agreement import ClockDifference, differences, obser
 from grader.grading.judging.idle_machine import quicker
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.plan import Plan, derive
 from grader.runtime.session import WALL, Job
 
@@ -33,13 +33,13 @@ BUSY = "the machine was too busy for a check on the wall clock"
 
 #: Exercise id and scenario id.
 Key = tuple[str, str]
-Record = Callable[[Sequence[Job]], Sequence[Trace]]
-Finished = Callable[[Key, Trace], None]
+Record = Callable[[Sequence[Job]], Sequence[AssessedTrace]]
+Finished = Callable[[Key, AssessedTrace], None]
 #: Returns what judges the beginnings of the recordings of a scenario.
 JudgeOf = Callable[[Key], "BeginningJudge"]
 
 
-def shortened(plan: Plan, virtual: Trace, judge: BeginningJudge) -> Plan:
+def shortened(plan: Plan, virtual: AssessedTrace, judge: BeginningJudge) -> Plan:
     """Shorten a plan to its beginning, for a spot check on the wall clock with the same stimuli."""
     bare = bare_plan(plan, virtual)
     if plan.first_message_on:
@@ -53,7 +53,7 @@ def shortened(plan: Plan, virtual: Trace, judge: BeginningJudge) -> Plan:
     return replace(bare, duration_ns=min(plan.duration_ns, watched_ns), shutdown_ns=0)
 
 
-def bare_plan(plan: Plan, virtual: Trace) -> Plan:
+def bare_plan(plan: Plan, virtual: AssessedTrace) -> Plan:
     """Change a plan to the wall clock, with no code of the grader in the student's processes."""
     first_node_ns = next((graph.t_ns for graph in virtual.graphs() if graph.nodes), 0)
     publishers = tuple(dict.fromkeys(e for g in virtual.graphs() for e in g.endpoints if e.kind == "publisher"))
@@ -86,7 +86,7 @@ class SpotChecks:
         """Whether this submission is checked no matter what its processes do."""
         return self.drawn or bool(self.reaches)
 
-    def due(self, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace]) -> list[Key]:
+    def due(self, jobs: Mapping[Key, Job], traces: Mapping[Key, AssessedTrace]) -> list[Key]:
         """Select the recordings to check.
 
         Of a submission that is drawn these are valid recordings in virtual time, of each program at least one. Of a
@@ -99,7 +99,7 @@ class SpotChecks:
             if _is_due(job.plan, traces[key], drawn=key in drawn, suspect=self.suspects(key, traces))
         ]
 
-    def _drawn_of(self, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace]) -> set[Key]:
+    def _drawn_of(self, jobs: Mapping[Key, Job], traces: Mapping[Key, AssessedTrace]) -> set[Key]:
         """Draw one scenario of each program in which as few others as possible run; of some, also other scenarios.
 
         Starting Python is most of the cost of a check. Nobody but the owner of the key can predict which are drawn.
@@ -118,7 +118,7 @@ class SpotChecks:
     def _draws(self, share: float, what: str) -> bool:
         return is_spot_checked(share, self.seed, f"{self.digest} {what}")
 
-    def suspects(self, key: Key, traces: Mapping[Key, Trace]) -> bool:
+    def suspects(self, key: Key, traces: Mapping[Key, AssessedTrace]) -> bool:
         """Whether the exercise must pass its check, because a program accesses internals of its process."""
         return bool(self.reaches) or any(t.reached for (exercise, _), t in traces.items() if exercise == key[0])
 
@@ -126,11 +126,11 @@ class SpotChecks:
 def check(  # noqa: PLR0913  what to check, with what, and where progress goes
     checks: SpotChecks,
     jobs: Mapping[Key, Job],
-    traces: Mapping[Key, Trace],
+    traces: Mapping[Key, AssessedTrace],
     record: Record,
     finished: Finished,
     judge_of: JudgeOf,
-) -> dict[Key, Trace]:
+) -> dict[Key, AssessedTrace]:
     """Run the spot checks that are due; where the clocks disagree, replace the exercise's traces by wall-clock ones.
 
     All are recorded at the same time first. That can make the clocks disagree, never agree, so whatever disagrees is
@@ -168,7 +168,7 @@ def _programs(job: Job) -> list[str]:
     return [name for name, _ in job.plan.processes]
 
 
-def _is_due(plan: Plan, trace: Trace, *, drawn: bool, suspect: bool) -> bool:
+def _is_due(plan: Plan, trace: AssessedTrace, *, drawn: bool, suspect: bool) -> bool:
     """Whether a recording is checked; one whose processes start at different times never is.
 
     A recording in virtual time is checked if it is drawn or suspect. One on the wall clock is checked only if it is
@@ -184,7 +184,7 @@ class _Checked:
     """A scenario that is checked: its recording, and what judges the beginning of another one."""
 
     job: Job
-    recorded: Trace
+    recorded: AssessedTrace
     judge: BeginningJudge
 
     def again(self) -> Job:
@@ -192,7 +192,7 @@ class _Checked:
         plan = shortened(self.job.plan, self.recorded, self.judge)
         return Job(f"{self.job.title}, checked on the wall clock", plan)
 
-    def compared(self, wall: Trace) -> tuple[ClockDifference | None, bool]:
+    def compared(self, wall: AssessedTrace) -> tuple[ClockDifference | None, bool]:
         """Return the most obvious difference, and whether a busy machine prevented a comparison.
 
         What no busy machine can cause comes first, and counts however busy it was.
@@ -236,15 +236,15 @@ def _agreed(due: Mapping[Key, _Checked], record: Record) -> set[Key]:
     return {key for (key, one), wall in pairs if one.compared(wall) == (None, False)}
 
 
-def _unchecked(trace: Trace, *, suspect: bool) -> Trace:
+def _unchecked(trace: AssessedTrace, *, suspect: bool) -> AssessedTrace:
     if suspect:
         return replace(trace, harness_problem=f"{BUSY}, and this submission inspects its own process")
     return replace(trace, unchecked=BUSY)
 
 
 def _decided(
-    difference: ClockDifference, jobs: Mapping[Key, Job], traces: Mapping[Key, Trace], record: Record
-) -> dict[Key, Trace]:
+    difference: ClockDifference, jobs: Mapping[Key, Job], traces: Mapping[Key, AssessedTrace], record: Record
+) -> dict[Key, AssessedTrace]:
     """Record all scenarios of an exercise on the wall clock, which decides."""
     decided = {}
     for key, job in jobs.items():

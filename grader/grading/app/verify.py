@@ -26,7 +26,7 @@ from grader.grading.submissions.sources import read_texts
 from grader.grading.submissions.submission import collect_submission, stage_collected
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EvidenceError, HarnessError
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.model.wording import printable
 from grader.runtime.recording.codec import to_json
 from grader.runtime.recording.packed import trace_from_json
@@ -95,7 +95,7 @@ class _Subject:
 
     name: str  # its path as the user typed it
     wanted: WantedRecording
-    kept: Mapping[Key, Trace] = field(default_factory=dict)  # recordings that were kept as evidence
+    kept: Mapping[Key, AssessedTrace] = field(default_factory=dict)  # recordings that were kept as evidence
     sources: Mapping[str, str] = field(default_factory=dict)  # wanted file name -> its text
     first: dict[Key, _First] = field(default_factory=dict)
     problem: str = ""  # why it could not be recorded first
@@ -116,7 +116,7 @@ class _First:
     clock_reason: str  # why virtual time does not suit it
 
     @property
-    def trace(self) -> Trace:
+    def trace(self) -> AssessedTrace:
         """The recording."""
         return trace_from_json(json.loads(zlib.decompress(self.packed)))
 
@@ -259,7 +259,7 @@ def _tried(
     return counted.tried()
 
 
-def _missing(trace: Trace) -> str:
+def _missing(trace: AssessedTrace) -> str:
     """Return that a recording lacks something because the machine was too busy, even in the second attempt."""
     return LATE if trace.incomplete else ""
 

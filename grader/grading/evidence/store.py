@@ -22,7 +22,7 @@ from grader.runtime.model.errors import EvidenceError
 from grader.runtime.model.limits import MAX_MANIFEST_BYTES, MAX_RECORDING_BYTES
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.recording.recording_file import place_of_trace, recording_bytes, trace_at, trace_of
 
 #: How much of a digest messages show, including its prefix.
@@ -146,7 +146,9 @@ def run_of(evidence: Evidence, exercises: Sequence[Exercise], *, verify: bool = 
     return run_from(manifest, exercises, traces)
 
 
-def run_from(manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Mapping[tuple[str, str], Trace]) -> Run:
+def run_from(
+    manifest: kept.Manifest, exercises: Sequence[Exercise], traces: Mapping[tuple[str, str], AssessedTrace]
+) -> Run:
     """Build a run from a manifest and its traces, by exercise and scenario, for the exercises to judge now."""
     return Run(
         submission=_submission(manifest),
@@ -191,11 +193,11 @@ def found_under(folder: Path) -> Sequence[Path]:
 
 def _trace(
     evidence: Evidence, owner: kept.KeptExercise, recording: kept.KeptRecording, exercise: Exercise, *, verify: bool
-) -> Trace:
+) -> AssessedTrace:
     asked = next((kept.scenario_digest(s) for s in exercise.scenarios if s.id == recording.scenario), "")
     if asked != recording.asked:
         problem = f"the rubric has changed the scenario {recording.scenario} since it was recorded"
-        return Trace(recording.scenario, ClockKind.VIRTUAL, 0, (), harness_problem=f"{problem}; grade again")
+        return AssessedTrace(recording.scenario, ClockKind.VIRTUAL, 0, (), harness_problem=f"{problem}; grade again")
     name = files.recording_name(owner.id, recording.scenario)
     path = evidence.folder / name
     data = files.read_file(path, MAX_RECORDING_BYTES)
@@ -214,7 +216,7 @@ def _trace(
 
 
 def _compare(
-    data: bytes, trace: Trace, evidence: Evidence, owner: kept.KeptExercise, recording: kept.KeptRecording
+    data: bytes, trace: AssessedTrace, evidence: Evidence, owner: kept.KeptExercise, recording: kept.KeptRecording
 ) -> None:
     """Raise EvidenceError if the messages of a recording differ from the trace that is judged."""
     facts = _kept_facts(evidence.manifest, owner)

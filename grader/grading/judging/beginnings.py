@@ -17,7 +17,7 @@ from grader.grading.model.exercise import Criterion, Exercise
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import Message, Trace
+from grader.runtime.model.trace import AssessedTrace, Message
 
 #: How long before the end both recordings are cut. An answer that comes just after one cut comes before another.
 CUTS_NS = (100 * NS_PER_MS, 300 * NS_PER_MS, 700 * NS_PER_MS)
@@ -62,7 +62,7 @@ class BeginningJudge:
         alone = [replace(c, scenario=scenario, scale=None) for c in asked]
         self._criteria = [(c, part) for c in alone if (part := for_beginning(c))]
 
-    def length_ns(self, trace: Trace, begins_ns: int) -> int:
+    def length_ns(self, trace: AssessedTrace, begins_ns: int) -> int:
         """Return how long a second recording has to be, from the moment at which the program has something to do.
 
         Args:
@@ -77,7 +77,7 @@ class BeginningJudge:
                 return length_ns
         return LENGTHS_NS[-1]
 
-    def compare(self, first: Trace, second: Trace, starts_ns: tuple[int, int]) -> Comparison:
+    def compare(self, first: AssessedTrace, second: AssessedTrace, starts_ns: tuple[int, int]) -> Comparison:
         """Judge both recordings, cut to the length of the second.
 
         Args:
@@ -107,7 +107,7 @@ class BeginningJudge:
         return Comparison(tuple(lost), unsure)
 
     def _judged(
-        self, criterion: Criterion, earned: Fraction, pairs: Sequence[tuple[Trace, Trace]]
+        self, criterion: Criterion, earned: Fraction, pairs: Sequence[tuple[AssessedTrace, AssessedTrace]]
     ) -> Iterator[tuple[Fraction, Fraction | None]]:
         """Yield the credit in both recordings for each cut at which the first one shows all that it earns."""
         for before, after in pairs:
@@ -117,7 +117,7 @@ class BeginningJudge:
             if all(self._credit(criterion, part) == credit for part in _without_first(before)):
                 yield credit, self._credit(criterion, after)
 
-    def _credit(self, criterion: Criterion, trace: Trace) -> Fraction | None:
+    def _credit(self, criterion: Criterion, trace: AssessedTrace) -> Fraction | None:
         """Return the share of its points that a criterion earns; None if it cannot be judged."""
         finding = run_check(criterion, self._exercise, {self._scenario: trace}, self._submission, self._sources).finding
         return None if finding is None else Fraction(finding.credit)
@@ -127,14 +127,14 @@ def _words(credit: Fraction) -> str:
     return "met" if credit == 1 else "partly met" if credit else "not met"
 
 
-def cut(trace: Trace, stop_ns: int) -> Trace:
+def cut(trace: AssessedTrace, stop_ns: int) -> AssessedTrace:
     """Return a recording as if it had been stopped earlier."""
     if stop_ns >= trace.stop_ns:
         return replace(trace, observations=tuple(o for o in trace.observations if o.t_ns < trace.stop_ns))
     return replace(trace, stop_ns=stop_ns, observations=tuple(o for o in trace.observations if o.t_ns < stop_ns))
 
 
-def _without_first(trace: Trace) -> Iterator[Trace]:
+def _without_first(trace: AssessedTrace) -> Iterator[AssessedTrace]:
     """Yield what is recorded if the first messages of each topic are lost."""
     first_ns: dict[str, int] = {}
     for message in trace.messages():

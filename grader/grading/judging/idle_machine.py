@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Fault,
     GraphSnapshot,
@@ -28,17 +29,18 @@ _ORDINARY_WAIT, _LONGEST_WAIT = 0.03, 0.9
 _SPEEDS, _DELAYS = 24, 8
 
 
-def quicker(trace: Trace) -> Iterator[Trace]:
+def quicker(assessed: AssessedTrace) -> Iterator[Trace]:
     """Yield what an idle machine may have recorded; nothing if the nodes did not wait for a processor.
 
     A wait makes a program slower all the time, or late by one delay: at its beginning, or with its answers. Whatever
     the chain of threads is from a program to the recording, a delay takes no longer than all of them waited together.
     """
+    trace = assessed.recorded
     ordinary = _ORDINARY_WAIT if trace.clock is ClockKind.WALL else 0
-    if trace.most_starved_ns <= ordinary * trace.stop_ns:
+    if assessed.most_starved_ns <= ordinary * trace.stop_ns:
         return
     longest_ns = round(_LONGEST_WAIT * trace.stop_ns)
-    slower_ns, late_ns = (min(waited, longest_ns) for waited in (trace.most_starved_ns, trace.all_starved_ns))
+    slower_ns, late_ns = (min(waited, longest_ns) for waited in (assessed.most_starved_ns, assessed.all_starved_ns))
     for step in range(1, _SPEEDS + 1):
         left = (1 - slower_ns / trace.stop_ns) ** (step / _SPEEDS)
         observations = tuple(replace(one, t_ns=round(one.t_ns * left)) for one in trace.observations)

@@ -30,7 +30,7 @@ from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario, is_launch_file
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, Submission, is_notebook
-from grader.runtime.model.trace import ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +77,16 @@ def _exercise_report(exercise: Exercise, run: Run, *, pictures: bool) -> Exercis
     own = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
     report = judge_exercise(exercise, own, run.submission, run.sources)
     if pictures:
-        return illustrated(report, exercise, own, run.submission, run.sources)
+        recorded = {scenario: trace.recorded for scenario, trace in own.items()}
+        return illustrated(report, exercise, recorded, run.submission, run.sources)
     return replace(report, excerpts=excerpts_for(report, run.submission, run.sources))
 
 
 def judge_exercise(
-    exercise: Exercise, traces: Mapping[str, Trace], submission: Submission, sources: Mapping[str, str] | None = None
+    exercise: Exercise,
+    traces: Mapping[str, AssessedTrace],
+    submission: Submission,
+    sources: Mapping[str, str] | None = None,
 ) -> ExerciseReport:
     """Return the report of one exercise; pure.
 
@@ -97,8 +101,9 @@ def judge_exercise(
     is undecided.
     """
     verdicts, facts = undiagnosed(exercise, traces, submission, sources)
-    recorded = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
-    reasons = [t.clock_reason for _, t in recorded if t.clock is ClockKind.WALL]
+    assessed = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
+    recorded = [(id_, t.recorded) for id_, t in assessed]
+    reasons = [t.clock_reason for _, t in assessed if t.clock is ClockKind.WALL]
     mistakes: list[AuthorMistake] = []
     if sources is not None:
         cases = cases_of(verdicts, on_recordings(exercise, verdicts), traces, submission, sources, facts)
@@ -113,12 +118,12 @@ def judge_exercise(
         notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources), *notes),
         graph=_graph(exercise, traces),
         starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
-        unchecked=next((t.unchecked for _, t in recorded if t.unchecked), ""),
+        unchecked=next((t.unchecked for _, t in assessed if t.unchecked), ""),
     )
 
 
 def undiagnosed(
-    exercise: Exercise, traces: Mapping[str, Trace], submission: Submission, sources: Mapping[str, str] | None
+    exercise: Exercise, traces: Mapping[str, AssessedTrace], submission: Submission, sources: Mapping[str, str] | None
 ) -> tuple[tuple[Verdict, ...], Mapping[str, object]]:
     """Return the verdicts without causes, in rubric order, and what each criterion's check hands to hint rules."""
     answers: dict[str, Answer] = {c.id: run_check(c, exercise, traces, submission, sources) for c in exercise.criteria}

@@ -11,7 +11,7 @@ from itertools import zip_longest
 from grader.grading.judging.source import Source, argument, literal_text, read_source
 from grader.grading.model.exercise import Location
 from grader.grading.model.verification import Cause, Difference, DifferenceKind, RecordingFact
-from grader.runtime.model.trace import Fault, GraphSnapshot, LogRecord, Observation, OutputLine, Trace
+from grader.runtime.model.trace import AssessedTrace, Fault, GraphSnapshot, LogRecord, Observation, OutputLine
 
 #: What can be compared by `==` and hashed.
 _Key = tuple[object, ...]
@@ -33,17 +33,17 @@ _PAST_THE_CLOCK = ("CDLL", "clock_gettime", "clock_gettime_ns", *_FILE_TIME)
 _KERNEL_FILES = ("/proc/", "/sys/", "/dev/urandom", "/dev/random")
 
 
-def is_comparable(trace: Trace) -> bool:
+def is_comparable(trace: AssessedTrace) -> bool:
     """Return whether a recording should repeat: it is one in virtual time, which suits its programs."""
     return not trace.clock_reason
 
 
-def events(trace: Trace) -> tuple[Observation, ...]:
+def events(trace: AssessedTrace) -> tuple[Observation, ...]:
     """Return what the programs did, in order: everything but the ROS graph, which is what the grader saw of it."""
     return tuple(o for o in trace.observations if not isinstance(o, GraphSnapshot))
 
 
-def first_difference(first: Trace, other: Trace, sources: Mapping[str, str]) -> Difference | None:
+def first_difference(first: AssessedTrace, other: AssessedTrace, sources: Mapping[str, str]) -> Difference | None:
     """Return the first difference between two recordings of a plan; None if they are the same.
 
     What the programs did comes before what only the grader saw. Two recordings of which neither is comparable have no
@@ -72,7 +72,7 @@ def first_difference(first: Trace, other: Trace, sources: Mapping[str, str]) -> 
 
 #: What belongs to a recording besides its events. Notes tell what the grader met with, and suspicions only what it saw;
 #: files that a program wrote are lost if it does not report them in time when it is told to stop.
-_FACTS: tuple[tuple[DifferenceKind, str, Callable[[Trace], object]], ...] = (
+_FACTS: tuple[tuple[DifferenceKind, str, Callable[[AssessedTrace], object]], ...] = (
     (DifferenceKind.TIME, "end", lambda trace: trace.stop_ns),
     (DifferenceKind.CONTENT, "starts", lambda trace: trace.starts),
     (DifferenceKind.CONTENT, "left out", lambda trace: trace.left_out),
@@ -85,7 +85,7 @@ _FACTS: tuple[tuple[DifferenceKind, str, Callable[[Trace], object]], ...] = (
 )
 
 
-def _clock(trace: Trace) -> str:
+def _clock(trace: AssessedTrace) -> str:
     return f"the wall clock: {trace.clock_reason}" if trace.clock_reason else "virtual time"
 
 

@@ -22,7 +22,7 @@ from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.extras import pip_install
 from grader.runtime.model.scenario import Scenario, is_launch_file
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Request, Response, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, FaultKind, Request, Response, Trace
 
 #: How many gaps between messages show that the first one is unusual.
 _FEWEST_GAPS = 5
@@ -67,7 +67,7 @@ def check_name(criterion: Criterion) -> str:
 def run_check(
     criterion: Criterion,
     exercise: Exercise,
-    traces: Mapping[str, Trace],
+    traces: Mapping[str, AssessedTrace],
     submission: Submission,
     sources: Mapping[str, str] | None = None,
 ) -> Answer:
@@ -90,7 +90,7 @@ def run_check(
 def _run_once(
     criterion: Criterion,
     exercise: Exercise,
-    traces: Mapping[str, Trace],
+    traces: Mapping[str, AssessedTrace],
     submission: Submission,
     sources: Mapping[str, str] | None,
 ) -> Answer:
@@ -105,7 +105,8 @@ def _run_once(
         return _unrecorded(scenario, trace)
     if scenario.test is not None:  # every program of its run counts, under whatever name it was started
         scenario = replace(scenario, processes=tuple(dict.fromkeys(fault.process for fault in trace.faults())))
-    answer = _judged(criterion, scenario, trace, sources)
+    recorded = trace.recorded
+    answer = _judged(criterion, scenario, recorded, sources)
     if answer.finding is not None and answer.finding.credit < 1:
         faster = (_judged(criterion, scenario, one, sources).finding for one in quicker(trace))
         if any(finding is not None and finding.credit > answer.finding.credit for finding in faster):
@@ -114,7 +115,7 @@ def _run_once(
             worked = f"an idle one may need {lost} less for the nodes' work"
             problem = f"the machine was too busy: {worked if trace.clock is ClockKind.VIRTUAL else waited}"
             return Answer(problem=f"{problem}, which may be the reason", suspected=trace.suspected)
-        at_once = trace.once("first at once", lambda: _with_first_at_once(trace))
+        at_once = recorded.once("first at once", lambda: _with_first_at_once(recorded))
         finding = None if at_once is None else _judged(criterion, scenario, at_once, sources).finding
         if finding is not None and finding.credit > answer.finding.credit:
             return Answer(
@@ -122,13 +123,13 @@ def _run_once(
                 "which can be why",
                 suspected=trace.suspected,
             )
-    answer = _for_other_numpy(_for_older_python(answer, scenario, trace), scenario, trace, sources or {})
+    answer = _for_other_numpy(_for_older_python(answer, scenario, recorded), scenario, recorded, sources or {})
     if not reads_sources(criterion.check):
-        return _for_what_is_lacking(answer, criterion, scenario, trace, sources or {})
+        return _for_what_is_lacking(answer, criterion, scenario, recorded, sources or {})
     return answer if answer.finding is None else replace(answer, finding=_placed(answer.finding, submission))
 
 
-def _unrecorded(scenario: Scenario, trace: Trace | None) -> Answer:
+def _unrecorded(scenario: Scenario, trace: AssessedTrace | None) -> Answer:
     """Return why there is no recording that could be judged."""
     if trace is None:
         return Answer(problem=f"the scenario {scenario.id} was not recorded")

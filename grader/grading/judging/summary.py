@@ -21,7 +21,7 @@ from grader.grading.judging.values import as_number, published, student_endpoint
 from grader.grading.model.report import Pace, Summary, TopicSummary
 from grader.runtime.model.extras import pip_install
 from grader.runtime.model.quantities import NS_PER_S, seconds
-from grader.runtime.model.trace import Fault, FaultKind, LogRecord, Message, Offer, Trace
+from grader.runtime.model.trace import AssessedTrace, Fault, FaultKind, LogRecord, Message, Offer, Trace
 
 #: The different values of a text field that a summary names, and the elements of an array that it looks at: enough for
 #: a laser scan, and quick for an image.
@@ -35,7 +35,7 @@ _FRAME = re.compile(r'\s+File "([^"]+)", line (\d+), in (\S+)')
 
 
 def summarise(
-    trace: Trace,
+    trace: AssessedTrace,
     processes: Sequence[str],
     isolation: str,
     sources: Mapping[str, str] = MappingProxyType({}),

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 from grader.grading.model.measures import Measure, Measured, Reading, Scale, readings_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace, Trace
 from grader.runtime.stimuli import RecordedStream
 
 
@@ -345,7 +345,8 @@ def reads_sources(check: object) -> TypeGuard[SourceCheck]:
 
 
 def ask(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:
-    """Return the finding of a check, which may need the students' files too."""
+    """Return the finding of a check, which may need the students' files too, and sees only what was recorded."""
+    trace = trace.recorded if isinstance(trace, AssessedTrace) else trace
     if sources is not None and reads_sources(check):
         return check.judge_sources(trace, sources)
     return check.judge(trace)

@@ -9,7 +9,7 @@ from grader.grading.model.report import Environment, Reproduction
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.packages import BroughtPackage
 from grader.runtime.model.submission import Definition, Submission
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +18,7 @@ class Run:
 
     submission: Submission  # the submission; judging never reads files in its `root`
     # (exercise id, scenario id) -> trace; a scenario with a missing file has none
-    traces: Mapping[tuple[str, str], Trace]
+    traces: Mapping[tuple[str, str], AssessedTrace]
     sources: Mapping[str, str]  # wanted file name -> its text, for finding the causes of lost points
     environment: Environment  # the software that it was recorded with
     seed: int  # determines every drawn value

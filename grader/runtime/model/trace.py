@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import field
+from dataclasses import field, fields
 from enum import Enum
 from typing import Any, TypeVar
 
@@ -388,29 +388,15 @@ class Tested:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """The recording of one scenario."""
+    """What was recorded of one scenario: all that checks, hint rules and charts read."""
 
     scenario: str
     clock: ClockKind  # which clock the nodes ran on
     stop_ns: int  # when observation ended; the window is [0, stop_ns). Later observations followed the stop signal.
     observations: tuple[Observation, ...]
-    clock_reason: str = ""  # why virtual time is not suitable for these nodes; empty if it is
     # Sentences that readers must know (entry without a guard, a limit reached, lost messages)
     notes: tuple[str, ...] = ()
-    harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
-    # Whether what the submission does may be why there is a harness problem
-    suspected: bool = False
     starts: tuple[Start, ...] = ()  # how each process was started
-    # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
-    reached: tuple[str, ...] = ()
-    # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used; in
-    # virtual time, how much less time an idle machine may need for the nodes' work, where that is counted
-    most_starved_ns: int = 0
-    # How long all threads of the nodes and of the grader's worker together waited for them: nothing is recorded later
-    # than that because the machine was busy
-    all_starved_ns: int = 0
-    # Why no check on the wall clock came to a result; empty if one did, or none was due. The result is then not final.
-    unchecked: str = ""
     # What a launch file asks for and the grader cannot do, as sentences: what is not met may be due to it
     left_out: tuple[str, ...] = ()
     # Programs beside the student's own that were not started, as sentences, each with the one topic, service or action
@@ -419,12 +405,6 @@ class Trace:
     written: tuple[WrittenFile, ...] = ()  # of programs that ended in time
     other_numpy: OtherNumpy | None = None  # what numpy programs run with, if it is not that of the ROS release
     newer: tuple[NewerPython, ...] = ()  # what programs ended of, and would not where the release's own Python runs
-    # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
-    incomplete: bool = False
-    # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without
-    author_mistake: AuthorMistake | None = None
-    # In virtual time, whether the work of a node before its pauses may slow it down: a reason to record again
-    may_drift: bool = False
     # What the test has found whose run this is; None for a scenario that checks judge
     tested: Tested | None = None
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -501,3 +481,45 @@ class Trace:
         """Return every `service` or `client` that was ever in the graph, each once, in order of appearance."""
         seen = (e for g in self.graphs() for e in g.services if e.kind == kind and service in (None, e.service))
         return tuple(dict.fromkeys(seen))
+
+
+@dataclass(frozen=True, slots=True)
+class AssessedTrace(Trace):
+    """A trace with what the grader thinks of it: whether it can be judged, on which clock, and what to record again.
+
+    No check can read that: it is handed what was `recorded`.
+    """
+
+    clock_reason: str = ""  # why virtual time is not suitable for these nodes; empty if it is
+    harness_problem: str = ""  # a failure of the grader or the machine that prevents judging; empty if there was none
+    # Whether what the submission does may be why there is a harness problem
+    suspected: bool = False
+    # Audit events of suspicious actions, as the processes report them: a reason for a check, not evidence
+    reached: tuple[str, ...] = ()
+    # On the wall clock, how long the thread of the nodes that waited most waited for processors that others used; in
+    # virtual time, how much less time an idle machine may need for the nodes' work, where that is counted
+    most_starved_ns: int = 0
+    # How long all threads of the nodes and of the grader's worker together waited for them: nothing is recorded later
+    # than that because the machine was busy
+    all_starved_ns: int = 0
+    # Why no check on the wall clock came to a result; empty if one did, or none was due. The result is then not final.
+    unchecked: str = ""
+    # Whether a wait for the middleware timed out, so that something may be missing: a reason to record again
+    incomplete: bool = False
+    # The mistake in a simulation of the rubric's author that prevents judging, as `harness_problem` does; None without
+    author_mistake: AuthorMistake | None = None
+    # In virtual time, whether the work of a node before its pauses may slow it down: a reason to record again
+    may_drift: bool = False
+
+    @property
+    def recorded(self) -> Trace:
+        """The trace alone; always the same object, so that what is cached in it is found again."""
+        return self.once("recorded", self._without_assessment)
+
+    def _without_assessment(self) -> Trace:
+        return Trace(**{field.name: getattr(self, field.name) for field in fields(Trace) if field.init})
+
+    @staticmethod
+    def unremarkable(trace: Trace) -> AssessedTrace:
+        """Return a trace of which the grader thinks nothing in particular."""
+        return AssessedTrace(**{field.name: getattr(trace, field.name) for field in fields(Trace) if field.init})

@@ -17,6 +17,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from grader.runtime.model.scenario import Planned
 from grader.runtime.model.trace import (
+    AssessedTrace,
     Delivery,
     Fault,
     GraphSnapshot,
@@ -30,7 +31,6 @@ from grader.runtime.model.trace import (
     Response,
     Start,
     Tested,
-    Trace,
 )
 from grader.runtime.stimuli import PLANNED
 
@@ -62,7 +62,7 @@ _QOS, _USUAL_QOS = 2, ["reliable", "volatile"]
 _ENDPOINTS = 3
 
 
-def trace_to_json(trace: Trace, *, aside: bool = False) -> dict[str, Any]:
+def trace_to_json(trace: AssessedTrace, *, aside: bool = False) -> dict[str, Any]:
     """Convert a trace to plain JSON values; NaN and infinities become `{"float": "nan"}`.
 
     A field of a trace is written if it is not as usual. With `aside`, what evidence does not include is written too: a
@@ -79,7 +79,9 @@ def trace_to_json(trace: Trace, *, aside: bool = False) -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def _fields_of_trace() -> tuple[tuple[str, Any], ...]:
     """Return the fields of a trace but its observations, with their usual values; those of `HEAD` come first."""
-    usual = {field.name: field.default for field in fields(Trace) if field.init and field.name != "observations"}
+    usual = {
+        field.name: field.default for field in fields(AssessedTrace) if field.init and field.name != "observations"
+    }
     return tuple({**{name: usual[name] for name in HEAD}, **usual}.items())
 
 

@@ -14,6 +14,7 @@ import msgspec
 
 from grader.runtime.model.errors import EvidenceError, HarnessError
 from grader.runtime.model.trace import (
+    AssessedTrace,
     Delivery,
     Endpoint,
     Fault,
@@ -31,7 +32,6 @@ from grader.runtime.model.trace import (
     ServiceEnd,
     Start,
     Tested,
-    Trace,
     WrittenFile,
 )
 from grader.runtime.recording.codec import FORMAT, HEAD, TAGS, trace_to_json
@@ -155,15 +155,15 @@ def _trace_row(rows: Iterable[Any]) -> Any:
     observations: Any = list[Union[tuple(rows)]]  # type: ignore[misc]  # noqa: UP007
     written: list[Any] = [("format", str), ("observations", observations)]
     written += [(name, _written_as(hint)) for name, hint in _HINTS.items() if name in HEAD]
-    usual = {field.name: field.default for field in fields(Trace)}
+    usual = {field.name: field.default for field in fields(AssessedTrace)}
     written += [(name, _written_as(hint), usual[name]) for name, hint in _HINTS.items() if name not in HEAD]
     return msgspec.defstruct("Trace", written)
 
 
-def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> Trace:
+def _trace_of(row: Any, makers: Mapping[type, Callable[[Any], Observation]]) -> AssessedTrace:
     """Build a trace from a struct, with these functions for observations."""
     values = {name: _made(hint, getattr(row, name)) for name, hint in _HINTS.items()}
-    return Trace(observations=tuple([makers[type(one)](one) for one in row.observations]), **values)
+    return AssessedTrace(observations=tuple([makers[type(one)](one) for one in row.observations]), **values)
 
 
 def _part_of(hint: Any) -> Any:
@@ -187,7 +187,7 @@ def _made(hint: Any, value: Any) -> Any:
     return tuple(map(make, value)) if get_origin(hint) is tuple else make(value)
 
 
-def trace_from_json(data: Any) -> Trace:
+def trace_from_json(data: Any) -> AssessedTrace:
     """Build a trace from JSON values; raises HarnessError if they are not valid."""
     try:
         if data["format"] != FORMAT:
@@ -298,8 +298,8 @@ _PARTS: Mapping[Any, tuple[Any, Callable[[Any], Any]]] = {
 }
 #: The types of the fields of a trace but its observations: memory, the wire and evidence follow from them.
 _HINTS: Mapping[str, Any] = {
-    field.name: get_type_hints(Trace)[field.name]
-    for field in fields(Trace)
+    field.name: get_type_hints(AssessedTrace)[field.name]
+    for field in fields(AssessedTrace)
     if field.init and field.name != "observations"
 }
 _TRACE = _trace_row(_EXACT_ROWS.values())
@@ -320,7 +320,7 @@ _MAKERS: Mapping[type, Callable[[Any], Observation]] = {
 _DECODER = msgspec.json.Decoder(_trace_row(_ROWS.values()))
 
 
-def pack_trace(trace: Trace, there: Sequence[bool]) -> bytes:
+def pack_trace(trace: AssessedTrace, there: Sequence[bool]) -> bytes:
     """Pack a trace as JSON; the same trace gives the same bytes.
 
     For each observation, `there` says whether the recording contains its bytes as a message.
@@ -332,7 +332,7 @@ def pack_trace(trace: Trace, there: Sequence[bool]) -> bytes:
     return json.dumps(data, allow_nan=False, separators=(",", ":")).encode()
 
 
-def unpack_trace(data: bytes) -> Trace:
+def unpack_trace(data: bytes) -> AssessedTrace:
     """Unpack a trace without the bytes of messages, which judging does not read; raises EvidenceError if invalid."""
     if not data.isascii():
         return unpack_exactly(data, None)  # `pack` writes ASCII, and only of that the quick way checks every byte
@@ -348,7 +348,7 @@ def unpack_trace(data: bytes) -> Trace:
     return trace
 
 
-def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> Trace:
+def unpack_exactly(data: bytes, cdrs: Sequence[bytes] | None) -> AssessedTrace:
     """Unpack a trace; raises EvidenceError if it is invalid, or does not match the recording.
 
     The bytes of the recording's messages are given one for each observation; None leaves them out.

@@ -30,6 +30,7 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.releases import DEFAULT
 from grader.runtime.model.submission import Definition
 from grader.runtime.model.trace import (
+    AssessedTrace,
     Delivery,
     Fault,
     GraphSnapshot,
@@ -41,7 +42,6 @@ from grader.runtime.model.trace import (
     OutputLine,
     Request,
     Response,
-    Trace,
 )
 from grader.runtime.recording.codec import observation_to_json, plain, to_json
 from grader.runtime.recording.packed import pack_trace, unpack_exactly, unpack_trace
@@ -272,7 +272,7 @@ class _Channels:
 
 
 def recording_bytes(
-    trace: Trace, facts: Mapping[str, str], name: str, brought: Mapping[str, Definition] | None = None
+    trace: AssessedTrace, facts: Mapping[str, str], name: str, brought: Mapping[str, Definition] | None = None
 ) -> tuple[bytes, bytes]:
     """Convert a trace to an MCAP file, and the `metadata.yaml` that makes its folder a rosbag2 recording.
 
@@ -310,14 +310,14 @@ def place_of_trace(recording: bytes) -> tuple[int, int]:
     return index.offset + index.length - 4 - index.data_size, index.data_size
 
 
-def trace_at(recording: bytes, at: int, size: int) -> Trace:
+def trace_at(recording: bytes, at: int, size: int) -> AssessedTrace:
     """Read the trace at an offset of a recording, without the bytes of messages, which judging does not read."""
     with _reading():
         data = _unpressed(recording[at : at + size])
     return unpack_trace(data)
 
 
-def trace_of(recording: bytes) -> Trace:
+def trace_of(recording: bytes) -> AssessedTrace:
     """Read the trace of a recording with the bytes of its messages."""
     data = packed_trace(recording)
     with _reading():
@@ -360,7 +360,7 @@ def _decompressor() -> zstandard.ZstdDecompressor:
     return zstandard.ZstdDecompressor()
 
 
-def _about(trace: Trace, facts: Mapping[str, str]) -> dict[str, Any]:
+def _about(trace: AssessedTrace, facts: Mapping[str, str]) -> dict[str, Any]:
     """Return the information that readers need before the first message."""
     return {
         "scenario": trace.scenario,

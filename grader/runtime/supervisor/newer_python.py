@@ -21,7 +21,7 @@ from typing import TypeAlias
 from grader.runtime.contained import run_contained
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.releases import release_of
-from grader.runtime.model.trace import Fault, FaultKind, NewerPython, Trace
+from grader.runtime.model.trace import AssessedTrace, Fault, FaultKind, NewerPython
 from grader.runtime.programs.inert import read_text
 
 Version: TypeAlias = tuple[int, int]
@@ -64,7 +64,7 @@ _LACKS = (
 )
 
 
-def with_newer(trace: Trace, root: str, distro: str) -> Trace:
+def with_newer(trace: AssessedTrace, root: str, distro: str) -> AssessedTrace:
     """Return a trace with what its programs failed of, and would not with the Python of the ROS release.
 
     Args:
@@ -82,7 +82,7 @@ def with_newer(trace: Trace, root: str, distro: str) -> Trace:
     return replace(trace, newer=found) if found else trace
 
 
-def _newer(trace: Trace, root: Path, distro: str) -> Iterator[NewerPython]:
+def _newer(trace: AssessedTrace, root: Path, distro: str) -> Iterator[NewerPython]:
     hidden = {Path(name).stem for start in trace.starts for name in start.hidden}
     for fault in trace.faults():
         if fault.kind is FaultKind.SYNTAX_ERROR:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.plan import Plan
 from grader.runtime.supervisor.pace import keeps_pace, slower_share
 
@@ -55,12 +55,12 @@ class NextRecording:
 #: With the time of all work, and of what is surely work on an idle machine too.
 COUNTED, SURELY_COUNTED = NextRecording(charged=1.0, may_stop=True), NextRecording(charged=SURE_SHARE)
 #: What was recorded of a scenario so far, in order.
-Made = Sequence[tuple[NextRecording, Trace]]
+Made = Sequence[tuple[NextRecording, AssessedTrace]]
 
 
 def next_recording(  # noqa: PLR0911  one for each row of the table
     made: Made, clock: str, *, on_wall: bool = True
-) -> NextRecording | Trace:
+) -> NextRecording | AssessedTrace:
     """Return the recording to make next, or the trace that counts.
 
     | recorded so far | next |
@@ -108,8 +108,8 @@ def next_recording(  # noqa: PLR0911  one for each row of the table
 
 
 def _counted(  # noqa: PLR0911  as above
-    plain: Trace, wall: Trace, counted: Sequence[Trace], surely: Trace | None
-) -> NextRecording | Trace:
+    plain: AssessedTrace, wall: AssessedTrace, counted: Sequence[AssessedTrace], surely: AssessedTrace | None
+) -> NextRecording | AssessedTrace:
     """Return the same where the machine is too busy for the wall clock: a trace that counts the time of the work.
 
     A node that keeps its pace once is fast enough, because a busy machine makes work slower and never faster. One that
@@ -142,6 +142,6 @@ def _counted(  # noqa: PLR0911  as above
     return replace(noted, most_starved_ns=slower_ns, all_starved_ns=slower_ns)
 
 
-def _was_held_up(trace: Trace) -> bool:
+def _was_held_up(trace: AssessedTrace) -> bool:
     """Return whether a recording on the wall clock shows how busy the machine was, more than how fast the nodes are."""
     return bool(trace.harness_problem) or trace.most_starved_ns > HELD_UP_SHARE * trace.stop_ns

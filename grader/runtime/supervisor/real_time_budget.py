@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from grader.runtime.model.quantities import NS_PER_S, duration
-from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, FaultKind
 
 if TYPE_CHECKING:
     from grader.runtime.plan import Plan
@@ -62,11 +62,11 @@ class RealTimeBudget:
             self._real_ns += real_ns
             self._starved_ns += starved_ns
 
-    def unrecorded(self, plan: Plan) -> Trace:
+    def unrecorded(self, plan: Plan) -> AssessedTrace:
         """Return the trace of a scenario for which no time is left: a fault of the nodes, or a harness problem."""
         clock = ClockKind(plan.clock)
         if self._starved_ns > STARVED_SHARE * self._real_ns:
             problem = f"the machine was too busy: {self._exceeded}"
-            return Trace(plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
+            return AssessedTrace(plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem)
         faults = tuple(Fault(0, name, FaultKind.KILLED, self.words) for name, _ in plan.processes)
-        return Trace(plan.scenario, clock, stop_ns=plan.duration_ns, observations=faults)
+        return AssessedTrace(plan.scenario, clock, stop_ns=plan.duration_ns, observations=faults)

@@ -34,7 +34,7 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S, size
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.submission import ReadProgram
-from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, FaultKind
 from grader.runtime.recording.codec import to_json
 from grader.runtime.ros_installation import PythonRuntime
 from grader.runtime.sandbox.environment import worker_environment
@@ -179,7 +179,7 @@ class WorkerProcess(ABC):
         if domain is not None:
             self._domains.give_back(domain)
 
-    def run(self, plan: Plan, budget: RealTimeBudget) -> Trace:
+    def run(self, plan: Plan, budget: RealTimeBudget) -> AssessedTrace:
         """Run one plan; raises HarnessError if the worker fails, WorkerLostError if it has ended or times out."""
         from grader.runtime.recording.packed import trace_from_json  # noqa: PLC0415 - takes as long as a start
 
@@ -326,7 +326,7 @@ class WorkerProcess(ABC):
         """Kill the worker and everything that it started."""
 
 
-def _without_recording(plan: Plan, mistake: Any) -> Trace:
+def _without_recording(plan: Plan, mistake: Any) -> AssessedTrace:
     """Return an empty trace with the mistake of the rubric's author; raises HarnessError if the author made none."""
     import msgspec  # noqa: PLC0415 - takes as long as the import of what reads traces
 
@@ -334,7 +334,7 @@ def _without_recording(plan: Plan, mistake: Any) -> Trace:
         found = msgspec.convert(mistake, AuthorMistake)
     except msgspec.ValidationError as error:
         raise HarnessError(f"worker: expected a mistake with file, line and text, found {error}") from error
-    return Trace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), author_mistake=found)
+    return AssessedTrace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), author_mistake=found)
 
 
 class ExecutedWorker(WorkerProcess):
@@ -613,11 +613,11 @@ class Recorder:
             self._discard(worker)
         self._idle.put(worker if usable else None)
 
-    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[Trace]:
+    def record(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> list[AssessedTrace]:
         """Record every job and return the traces in the same order."""
         return list(self.each(jobs, progress))
 
-    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[Trace]:
+    def each(self, jobs: Sequence[Job], progress: Callable[[str], None]) -> Iterator[AssessedTrace]:
         """Begin to record every job, and yield the traces in the same order, each as soon as it is available.
 
         With several workers, the longest scenarios begin first, so that no worker is left alone with one at the end.
@@ -627,7 +627,7 @@ class Recorder:
         futures = {at: self._pool.submit(self._record, jobs[at], progress) for at in order}
         return (futures[at].result() for at in range(len(jobs)))
 
-    def _record(self, job: Job, progress: Callable[[str], None]) -> Trace:
+    def _record(self, job: Job, progress: Callable[[str], None]) -> AssessedTrace:
         """Record a job, and repeat it if a signal ended a process or messages were lost: a real fault happens again."""
         progress(job.title)
         if job.plan.clock != ClockKind.WALL.value:
@@ -636,13 +636,13 @@ class Recorder:
         with contextlib.nullcontext() if job.parallel else self._on_the_wall:
             return self._recorded_surely(job)
 
-    def _recorded_surely(self, job: Job) -> Trace:
+    def _recorded_surely(self, job: Job) -> AssessedTrace:
         trace = self._recorded(job)
         # A signal that no limit explains may come from the machine, such as one that is out of memory.
         doubtful = trace.incomplete or any(f.signal for f in trace.faults())
         return self._recorded(job) if doubtful and job.budget.left_ns else trace
 
-    def _recorded(self, job: Job) -> Trace:
+    def _recorded(self, job: Job) -> AssessedTrace:
         problem = ""
         limits: list[str] = []
         with_submission = 0  # failures after its code had started, as far as that is known
@@ -689,11 +689,13 @@ class Recorder:
                 )
                 for name, _ in job.plan.processes
             )
-            return Trace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
+            return AssessedTrace(job.plan.scenario, clock, stop_ns=job.plan.duration_ns, observations=faults)
         suspected = with_submission >= TRIES
         if suspected:
             problem += f" ({with_submission} times, each time in another worker, while this submission was recorded)"
-        return Trace(job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem, suspected=suspected)
+        return AssessedTrace(
+            job.plan.scenario, clock, stop_ns=0, observations=(), harness_problem=problem, suspected=suspected
+        )
 
     def _drops_place(self) -> bool:
         """Return whether a worker is not replaced until none is busy: the others go on, and a start takes long."""

@@ -28,7 +28,7 @@ from grader.runtime.model.errors import EnvironmentFault, HarnessError
 from grader.runtime.model.extras import pip_install
 from grader.runtime.model.quantities import NS_PER_S, duration
 from grader.runtime.model.scenario import RubricTest
-from grader.runtime.model.trace import ClockKind, Observation, Tested, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Observation, Tested
 from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import from_json, to_json
 from grader.runtime.shipped import PACKAGE
@@ -82,7 +82,7 @@ def record_tests(
     jobs: Mapping[Key, TestJob],
     progress: Callable[[str], None],
     budget: RealTimeBudget | None = None,
-) -> dict[Key, Trace]:
+) -> dict[Key, AssessedTrace]:
     """Run tests and return their traces, in the same order; tests of the same file share a process of pytest.
 
     Raises:
@@ -91,7 +91,7 @@ def record_tests(
     if jobs:
         _ask_for_pytest()
     budget = budget or RealTimeBudget()
-    found: dict[Key, Trace] = {}
+    found: dict[Key, AssessedTrace] = {}
     groups: dict[tuple[RubricTest, Plan], dict[str, Key]] = {}
     for key, job in jobs.items():
         shared = replace(job.plan, scenario="", host_seed="", hash_seed=0, duration_ns=0)
@@ -129,9 +129,9 @@ def _ended(test: RubricTest, what: str) -> AuthorMistake:
 
 def _record_file(
     recorder: Recorder, jobs: Mapping[Key, TestJob], progress: Callable[[str], None], budget: RealTimeBudget
-) -> dict[Key, Trace]:
+) -> dict[Key, AssessedTrace]:
     """Run the tests of one file; those that are left when a process of pytest ends are run in another one."""
-    found: dict[Key, Trace] = {}
+    found: dict[Key, AssessedTrace] = {}
     tries: dict[Key, int] = {}
     while waiting := {key: job for key, job in jobs.items() if key not in found}:
         if not budget.left_ns:
@@ -148,13 +148,13 @@ def _record_file(
     return found
 
 
-def _without_run(job: TestJob, mistake: AuthorMistake) -> Trace:
-    return Trace(job.plan.scenario, ClockKind.VIRTUAL, stop_ns=0, observations=(), author_mistake=mistake)
+def _without_run(job: TestJob, mistake: AuthorMistake) -> AssessedTrace:
+    return AssessedTrace(job.plan.scenario, ClockKind.VIRTUAL, stop_ns=0, observations=(), author_mistake=mistake)
 
 
 def _round(
     recorder: Recorder, jobs: Mapping[Key, TestJob], progress: Callable[[str], None], budget: RealTimeBudget
-) -> Iterator[tuple[Key, Trace, bool]]:
+) -> Iterator[tuple[Key, AssessedTrace, bool]]:
     """Yield the traces of tests, until the process of pytest ends, each with whether it is worth another try."""
     keys = {job.test.name: key for key, job in jobs.items()}
     some = next(iter(jobs.values()))
@@ -202,7 +202,7 @@ class _TestRun:
     is_worth_another: bool = False
     has_ended_process: bool = False
 
-    def trace(self) -> Trace:
+    def trace(self) -> AssessedTrace:
         """Pass on commands until the test has ended, and return what was recorded."""
         began_ns = time.monotonic_ns()
         own_s = self.job.plan.limits.wall_ns / NS_PER_S
@@ -218,7 +218,7 @@ class _TestRun:
             timer.cancel()
             self._give_back(usable=False)
         self.budget.charge(time.monotonic_ns() - began_ns, 0)
-        trace = Trace(
+        trace = AssessedTrace(
             self.job.plan.scenario,
             ClockKind.VIRTUAL,
             self.now_ns + 1,
@@ -236,7 +236,7 @@ class _TestRun:
             return replace(trace, harness_problem=self.problem, suspected=bool(self.observations))
         return self._judged(trace, end)
 
-    def _judged(self, trace: Trace, end: Mapping[str, Any] | None) -> Trace:
+    def _judged(self, trace: AssessedTrace, end: Mapping[str, Any] | None) -> AssessedTrace:
         """Return the trace with what the test has found, or with the reason why that does not count."""
         mistake = _ended(self.job.test, "done") if end is None else _mistake_in(end, self.job.test)
         problem = "" if end is None else str(end.get("problem", ""))

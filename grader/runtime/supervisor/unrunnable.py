@@ -9,7 +9,7 @@ from grader.runtime.host.packages import PackageLayout, layout_of
 from grader.runtime.host.protocol import Exited, FaultReport
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.submission import ReadProgram
-from grader.runtime.model.trace import ClockKind, Fault, FaultKind, GraphSnapshot, Mark, Start, StartWay, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, FaultKind, GraphSnapshot, Mark, Start, StartWay
 from grader.runtime.plan import Plan
 from grader.runtime.worker.ending import ending, reported_fault
 from grader.runtime.worker.notes import Places
@@ -18,7 +18,7 @@ from grader.runtime.worker.notes import Places
 _UNKNOWN = ReadProgram()
 
 
-def trace_without_run(plan: Plan, programs: Mapping[str, ReadProgram]) -> Trace | None:
+def trace_without_run(plan: Plan, programs: Mapping[str, ReadProgram]) -> AssessedTrace | None:
     """Return what a run of the plan would record of its processes; None if any of them has to be run.
 
     Args:
@@ -30,7 +30,7 @@ def trace_without_run(plan: Plan, programs: Mapping[str, ReadProgram]) -> Trace 
     long = [(name, problem) for name, _ in plan.processes if (problem := plan.start_of(name).problem)]
     if long:
         faults = tuple(Fault(starts_ns.get(name, 0), name, FaultKind.KILLED, problem) for name, problem in long)
-        return Trace(plan.scenario, ClockKind(plan.clock), plan.duration_ns, faults)
+        return AssessedTrace(plan.scenario, ClockKind(plan.clock), plan.duration_ns, faults)
     ends: list[Fault | Mark] = []
     starts: list[Start] = []
     for name, file in plan.processes:
@@ -49,7 +49,7 @@ def trace_without_run(plan: Plan, programs: Mapping[str, ReadProgram]) -> Trace 
     end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
     ends.sort(key=lambda end: end.t_ns)
     graph = GraphSnapshot(ends[-1].t_ns, nodes=(), endpoints=(), services=())
-    return Trace(plan.scenario, ClockKind(plan.clock), end_ns, (*ends, graph), starts=tuple(starts))
+    return AssessedTrace(plan.scenario, ClockKind(plan.clock), end_ns, (*ends, graph), starts=tuple(starts))
 
 
 def _is_script(plan: Plan, name: str, file: str) -> bool:

@@ -18,6 +18,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import MOST_LAUNCHED, MOST_LEFT_OUT
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Fault,
     FaultKind,
@@ -26,7 +27,6 @@ from grader.runtime.model.trace import (
     Observation,
     Offer,
     OutputLine,
-    Trace,
 )
 from grader.runtime.plan import Plan, PlannedStart
 from grader.runtime.programs.executables import (
@@ -368,14 +368,14 @@ def expanded(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Plan:
     )
 
 
-def unstarted(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Trace:
+def unstarted(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> AssessedTrace:
     """Return the trace of a scenario with a launch file from which nothing can be started."""
     faults = tuple(made.fault for made in launched.values() if made.fault is not None)
-    trace = Trace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=faults)
+    trace = AssessedTrace(plan.scenario, ClockKind(plan.clock), stop_ns=plan.duration_ns, observations=faults)
     return renamed(trace, launched)
 
 
-def renamed(trace: Trace, launched: Mapping[str, EvaluatedLaunch]) -> Trace:
+def renamed(trace: AssessedTrace, launched: Mapping[str, EvaluatedLaunch]) -> AssessedTrace:
     """Return a trace in which processes go by the names that a rubric uses, and which tells what was left out."""
     labels = {process: label for made in launched.values() for process, label in made.labels}
     left_out = tuple(one for made in launched.values() for one in made.left_out)

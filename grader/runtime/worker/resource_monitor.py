@@ -18,7 +18,7 @@ from grader.runtime import usage
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, NS_PER_S, size
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.usage import FULL_BYTES, FULL_CODE, Kernel, Usage, processor_words
 from grader.runtime.worker.computing import ComputingProcesses
 from grader.runtime.worker.socket_memory import MANY_DESCRIPTORS, KernelMemory, SocketMemory, descriptors
@@ -124,7 +124,7 @@ class ResourceMonitor:
         self._over.set()
         self._thread.join()
 
-    def reviewed(self, trace: Trace) -> Trace:
+    def reviewed(self, trace: AssessedTrace) -> AssessedTrace:
         """Add to a trace how long threads waited, and a harness problem if waiting used up the time."""
         if trace.clock is ClockKind.WALL:
             self._look_for_waiting()

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from grader.runtime.host.protocol import Claim, ThreadFault
 from grader.runtime.message_classes import plain_fields
 from grader.runtime.model.scenario import Event
-from grader.runtime.model.trace import ClockKind, Mark, Observation, Offer, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Mark, Observation, Offer
 from grader.runtime.plan import Plan
 from grader.runtime.served_actions import PARTS_OF_ACTIONS, TOPICS_OF_ACTIONS, ServedAction, planned_action
 from grader.runtime.simulation.participant import Moment
@@ -78,7 +78,7 @@ class Runner(ABC):
             simulated=self._simulated,
         )
 
-    def run(self) -> Trace:
+    def run(self) -> AssessedTrace:
         """Run the plan to its end and return the trace."""
         self._begin()
         self._run_on()
@@ -89,7 +89,7 @@ class Runner(ABC):
         # A recording that is not judged, or has ended early, shows nothing about the end of its programs.
         if self._plan.shutdown_ns and not (unfit or self._recorder.full):
             self._shut_down()
-        return Trace(
+        return AssessedTrace(
             scenario=self._plan.scenario,
             clock=self.clock,
             clock_reason=unfit or self.clock_reason,

@@ -28,7 +28,7 @@ from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import GIB, MIB, NS_PER_S
 from grader.runtime.model.scenario import is_launch_file
-from grader.runtime.model.trace import ClockKind, Delivery, FaultKind, Mark, Message, Observation, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Delivery, FaultKind, Mark, Message, Observation
 from grader.runtime.patience import load_per_processor
 from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import from_json, observation_to_json, trace_to_json
@@ -223,7 +223,7 @@ class Worker:
         """Return whether nodes have left TCP connections in the worker's own network; the grader uses none."""
         return not self._isolation.shares_network and has_connections()
 
-    def _record(self, plan: Plan, domain: int, budget: Budget) -> Trace:
+    def _record(self, plan: Plan, domain: int, budget: Budget) -> AssessedTrace:
         launched: dict[str, EvaluatedLaunch] = {}
         started_ns = time.monotonic_ns()
         for name, file in plan.processes:
@@ -231,7 +231,9 @@ class Worker:
                 launched[name] = self._evaluate(plan, name, file, domain, budget.after(started_ns))
         if any(made.harness_problem for made in launched.values()):
             problem = next(made.harness_problem for made in launched.values() if made.harness_problem)
-            return Trace(plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), harness_problem=problem)
+            return AssessedTrace(
+                plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), harness_problem=problem
+            )
         if any(made.fault is not None or not made.processes for made in launched.values()):
             return unstarted(plan, launched)
         recorded = self._record_processes(expanded(plan, launched), domain, budget.after(started_ns))
@@ -254,7 +256,7 @@ class Worker:
             made = evaluated(students[0], plan)
             return made if made.fault is None else replace(made, harness_problem=monitor.problem)
 
-    def _record_processes(self, plan: Plan, domain: int, budget: Budget) -> Trace:
+    def _record_processes(self, plan: Plan, domain: int, budget: Budget) -> AssessedTrace:
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
@@ -492,7 +494,7 @@ def _lower(value: int, most: int) -> int:
     return value if most == resource.RLIM_INFINITY else min(value, most)
 
 
-def is_worn(trace: Trace) -> bool:
+def is_worn(trace: AssessedTrace) -> bool:
     """Return whether a worker should be replaced after a scenario: something unusual happened, or it has grown."""
     odd = any(f.kind in (FaultKind.KILLED, FaultKind.HUNG) for f in trace.faults()) or trace.notes or trace.incomplete
     full = any(isinstance(o, Mark) and o.name == "limit" for o in trace.observations)

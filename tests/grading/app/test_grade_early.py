@@ -18,7 +18,7 @@ from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import Environment, Report
 from grader.grading.model.run import Run
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 
 REFERENCE = ROOT / "reference_solutions"
 EXERCISES = read_exercises(GradeRequest("x"))
@@ -32,8 +32,8 @@ def a_run() -> Run:
     return Run(submission, traces={}, sources={}, environment=environment, seed=7)
 
 
-def silent(scenario: str) -> Trace:
-    return Trace(scenario, ClockKind.VIRTUAL, stop_ns=10**10, observations=())
+def silent(scenario: str) -> AssessedTrace:
+    return AssessedTrace(scenario, ClockKind.VIRTUAL, stop_ns=10**10, observations=())
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from grader.runtime.model.limits import MAX_FILE_BYTES
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Endpoint,
     Fault,
@@ -34,7 +35,6 @@ from grader.runtime.model.trace import (
     Offer,
     OutputLine,
     ServiceEnd,
-    Trace,
 )
 from grader.runtime.sandbox.bubblewrap import ROOT_NAME, USER_NAME
 from grader.runtime.session import Job
@@ -50,8 +50,8 @@ def an_end(kind: str, topic: str = "/t", node: str = "/a") -> Endpoint:
     return Endpoint(kind, topic, FLOAT, node, 0, "reliable", "volatile")
 
 
-def a_trace(*observations: Observation, stop_s: int = 10) -> Trace:
-    return Trace("observed", ClockKind.VIRTUAL, stop_s * NS_PER_S, tuple(observations))
+def a_trace(*observations: Observation, stop_s: int = 10) -> AssessedTrace:
+    return AssessedTrace("observed", ClockKind.VIRTUAL, stop_s * NS_PER_S, tuple(observations))
 
 
 SERVED = (("client", "/a"), ("service", "/b"))
@@ -532,7 +532,7 @@ class Recorder:
     def __init__(self, problem: str) -> None:
         self.problem, self.clocks = problem, list[str]()
 
-    def record(self, jobs: Mapping[str, Job], clock: str, progress: object) -> dict[str, Trace]:
+    def record(self, jobs: Mapping[str, Job], clock: str, progress: object) -> dict[str, AssessedTrace]:
         """Return a trace for each job."""
         self.clocks.append(clock)
         return {key: replace(a_trace(), harness_problem=self.problem, clock_reason="it works") for key in jobs}

@@ -25,7 +25,7 @@ from grader.grading.model.run import Run
 from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.plan import Plan
 from grader.runtime.supervisor.supervisor import Job
 from grader.testing import TraceBuilder
@@ -41,7 +41,9 @@ def job(scenario: str = "alone", **fields: Any) -> Job:
     return Job(scenario, Plan(scenario, (("a.py", "a.py"),), "/", "00", 10 * S, "/x", 60 * S, "virtual", **fields))
 
 
-def trace(clock: ClockKind = ClockKind.VIRTUAL, *, rate_hz: float = 20.0, value: float = 1.0, **fields: Any) -> Trace:
+def trace(
+    clock: ClockKind = ClockKind.VIRTUAL, *, rate_hz: float = 20.0, value: float = 1.0, **fields: Any
+) -> AssessedTrace:
     made = TraceBuilder("a.py", clock=clock).messages("/x", FLOAT, {"data": value}, rate_hz=rate_hz).trace()
     return replace(made, scenario="alone", **fields)
 
@@ -63,12 +65,12 @@ def judge_of(key: tuple[str, str]) -> BeginningJudge:
 class Recorder:
     """Gives traces of the wall clock in order, and remembers the plans, and which jobs were recorded in parallel."""
 
-    def __init__(self, *traces: Trace) -> None:
+    def __init__(self, *traces: AssessedTrace) -> None:
         self.traces = list(traces)
         self.plans: list[Plan] = []
         self.parallel: list[str] = []
 
-    def __call__(self, jobs: Sequence[Job]) -> Sequence[Trace]:
+    def __call__(self, jobs: Sequence[Job]) -> Sequence[AssessedTrace]:
         self.plans += [job.plan for job in jobs]
         self.parallel += [job.title for job in jobs if job.parallel]
         return [self.traces.pop(0) for _ in jobs]
@@ -79,9 +81,9 @@ def checked(
     *,
     reaches: tuple[str, ...] = ("gc",),
     share: float = 0.0,
-    virtual: Trace | None = None,
+    virtual: AssessedTrace | None = None,
     **fields: Any,
-) -> Trace:
+) -> AssessedTrace:
     heard = []
     checks = SpotChecks(share, 1, "sha256:0", reaches)
     jobs = {("one", "alone"): job(**fields)}
@@ -129,7 +131,7 @@ def test_a_criterion_that_is_met_on_one_clock_only_lets_the_wall_clock_decide() 
     assert checked(Recorder(off, SAME)) == trace()
 
 
-def starved(found: Trace) -> Trace:
+def starved(found: AssessedTrace) -> AssessedTrace:
     return replace(found, most_starved_ns=S)
 
 
@@ -143,7 +145,7 @@ def test_a_criterion_that_a_busy_machine_left_open_is_asked_again() -> None:
         exercise = replace(judge._exercise, criteria=(with_rate,))
         return BeginningJudge(exercise, key[1], judge._submission, {})
 
-    def found(*walls: Trace) -> Trace:
+    def found(*walls: AssessedTrace) -> AssessedTrace:
         checks, key, recorder = SpotChecks(0.0, 1, "sha256:0", ("gc",)), ("one", "alone"), Recorder(*walls)
         return check(checks, {key: job()}, {key: trace()}, recorder, lambda *_: None, judges_rate)[key]
 
@@ -209,7 +211,7 @@ def test_a_busy_machine_is_nobodys_mark() -> None:
 
 def on_wall(
     *, topic: str = "/x", value: float = RIGHT, rate_hz: float = 20.0, kind: str = "std_msgs/msg/Float32"
-) -> Trace:
+) -> AssessedTrace:
     """Return a recording of a machine that was too busy."""
     made = TraceBuilder("a.py", clock=ClockKind.WALL).publisher(topic, kind)
     found = made.messages(topic, kind, {"data": value}, rate_hz=rate_hz).trace()
@@ -221,7 +223,7 @@ def on_wall(
     [on_wall(topic="/t1"), on_wall(value=2.0), on_wall(kind="std_msgs/msg/Float64")],
     ids=["a topic", "a value", "a type"],
 )
-def test_what_no_busy_machine_can_cause_decides_however_busy_it_was(wall: Trace) -> None:
+def test_what_no_busy_machine_can_cause_decides_however_busy_it_was(wall: AssessedTrace) -> None:
     """What exists on the wall clock alone was made by the program: nothing excuses it."""
     same = TraceBuilder("a.py").publisher("/x", FLOAT).messages("/x", FLOAT, {"data": RIGHT}, rate_hz=20.0)
     decided = checked(
@@ -260,7 +262,7 @@ def test_what_a_process_reached_for_is_enough() -> None:
 
 
 @pytest.mark.parametrize("found", [trace(clock_reason="busy"), trace(harness_problem="lost"), ON_THE_WALL])
-def test_what_virtual_time_does_not_decide_is_not_checked(found: Trace) -> None:
+def test_what_virtual_time_does_not_decide_is_not_checked(found: AssessedTrace) -> None:
     """The wall clock has it already, or nobody."""
     recorder = Recorder()
     assert checked(recorder, virtual=found, reaches=(), share=1.0) == found

@@ -19,7 +19,7 @@ from grader.grading.app.request import GradeRequest
 from grader.grading.evidence.store import open_evidence, run_of
 from grader.grading.judging.repetition import first_difference
 from grader.runtime.model.checkup import NO_SANDBOX, TIERS
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.ros_installation import RosInstallation
 
 pytestmark = [pytest.mark.ros, pytest.mark.nightly]
@@ -65,7 +65,7 @@ def test_the_reference_solutions_repeat() -> None:
 # --- sandboxes and users ----------------------------------------------------------------------------------------------
 
 
-def recorded(kept: Path, *options: str, before: tuple[str, ...] = (), **variables: str) -> Mapping[Any, Trace]:
+def recorded(kept: Path, *options: str, before: tuple[str, ...] = (), **variables: str) -> Mapping[Any, AssessedTrace]:
     """Return recordings of the reference solutions, with their graph; skip where the sandbox is not there."""
     words = [GRADE, str(SOLUTIONS), "--seed", "1", "--no-progress", "-o", f"evidence={kept}", *options]
     environment = {**os.environ, **variables}
@@ -76,7 +76,7 @@ def recorded(kept: Path, *options: str, before: tuple[str, ...] = (), **variable
     return run_of(open_evidence(kept), exercises, verify=True).traces
 
 
-def differing(first: Mapping[Any, Trace], other: Mapping[Any, Trace]) -> dict[Any, object]:
+def differing(first: Mapping[Any, AssessedTrace], other: Mapping[Any, AssessedTrace]) -> dict[Any, object]:
     """Return the first difference of each scenario that has one."""
     assert first.keys() == other.keys()
     found = {key: first_difference(trace, other[key], {}) for key, trace in first.items()}

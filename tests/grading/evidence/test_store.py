@@ -16,7 +16,7 @@ from grader.grading.evidence.manifest import scenario_digest
 from grader.grading.evidence.store import check_place, first_report, found_under, open_evidence, run_of
 from grader.runtime.model.errors import EvidenceError
 from grader.runtime.model.scenario import Scenario, Span
-from grader.runtime.model.trace import Delivery, Message, Request, Response, Trace
+from grader.runtime.model.trace import AssessedTrace, Delivery, Message, Request, Response
 from grader.runtime.stimuli.messages import MessageStream
 from grader.runtime.stimuli.simulation import Simulated
 
@@ -28,7 +28,7 @@ def files(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-def without_bytes(trace: Trace) -> Trace:
+def without_bytes(trace: AssessedTrace) -> AssessedTrace:
     with_bytes = (Message, Delivery, Request, Response)
     plain = [dataclasses.replace(o, cdr=b"") if isinstance(o, with_bytes) else o for o in trace.observations]
     return dataclasses.replace(trace, observations=tuple(plain))

@@ -11,7 +11,7 @@ from grader.grading.judging.judge_run import notes_on_unheard
 from grader.grading.judging.summary import summarise
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.reporting.observed import render_summary
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.testing import TraceBuilder
 
 FLOAT, TF = "std_msgs/msg/Float32", "tf2_msgs/msg/TFMessage"
@@ -36,7 +36,7 @@ CHECKS: dict[str, tuple[Any, str, str, Any]] = {
 }
 
 
-def sent(topic: str, type_: str, value: Any, *times_s: float, early: int) -> Trace:
+def sent(topic: str, type_: str, value: Any, *times_s: float, early: int) -> AssessedTrace:
     """Return a trace with messages of which the first ones were sent before discovery."""
     built = TraceBuilder()
     for number, t_s in enumerate(times_s):

@@ -25,7 +25,7 @@ from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.errors import UNUSABLE
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.recording.codec import trace_to_json
 from grader.runtime.recording.packed import trace_from_json
 from grader.testing import TraceBuilder, partly
@@ -39,7 +39,7 @@ MORE = """\
 ENVIRONMENT = Environment("1", "jazzy", "7", "rmw", "3.11", "none")
 
 
-def report(folder: Path, checks: str, trace: Trace | None = None, rubric: str = RUBRIC + MORE) -> Report:
+def report(folder: Path, checks: str, trace: AssessedTrace | None = None, rubric: str = RUBRIC + MORE) -> Report:
     """Judge a silent pump with a file of checks, and draw its pictures."""
     exercise = read_rubric(write_rubric(folder, rubric, checks))
     submission = Submission("s", "s", Path("s"), "sha256:1", {"pump.py": StudentFile("pump.py", "pump.py")})
@@ -155,7 +155,7 @@ def test_a_mistake_in_a_check_is_the_authors_and_costs_no_report(tmp_path: Path,
 def test_a_simulation_that_fails_is_the_authors_mistake_too(tmp_path: Path) -> None:
     """Its trace says so, also after it was kept as evidence."""
     mistake = AuthorMistake("world.py", 40, "the simulation `hall` failed: ZeroDivisionError: float division by zero")
-    trace = Trace("alone", ClockKind.VIRTUAL, 0, (), author_mistake=mistake)
+    trace = AssessedTrace("alone", ClockKind.VIRTUAL, 0, (), author_mistake=mistake)
     assert trace_from_json(json.loads(json.dumps(trace_to_json(trace)))) == trace
     found = report(tmp_path, CHECKS_FILE, trace)
     assert {v.reason for v in found.exercises[0].verdicts[:2]} == {f"the rubric has a mistake: {mistake}"}

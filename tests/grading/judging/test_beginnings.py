@@ -23,7 +23,7 @@ from grader.grading.model.exercise import Check, Criterion, Exercise, Finding, o
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import ClockKind, Request, Response, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Request, Response, Trace
 from grader.testing import TraceBuilder
 
 S = 1_000_000_000
@@ -43,11 +43,11 @@ def judge_of(*checks: Check) -> BeginningJudge:
     return BeginningJudge(exercise, "alone", submission, {})
 
 
-def recorded(program: Program, clock: ClockKind = ClockKind.VIRTUAL, stop_s: float = 20.0) -> Trace:
+def recorded(program: Program, clock: ClockKind = ClockKind.VIRTUAL, stop_s: float = 20.0) -> AssessedTrace:
     return replace(program(TraceBuilder(FILE, stop_s=stop_s, clock=clock)).trace(), scenario="alone")
 
 
-def on_wall(program: Program, stop_s: float = 5.0) -> Trace:
+def on_wall(program: Program, stop_s: float = 5.0) -> AssessedTrace:
     return recorded(program, ClockKind.WALL, stop_s)
 
 
@@ -205,7 +205,7 @@ def test_a_check_is_as_short_as_its_criteria_allow() -> None:
     assert judge_of(RATE).length_ns(recorded(swinging()), 0) == first
     assert judge_of().length_ns(recorded(swinging()), 0) == first
 
-    def logs(at_s: float) -> Trace:
+    def logs(at_s: float) -> AssessedTrace:
         return recorded(lambda b: b.log(at_s, "hello"))
 
     assert judge_of(UsesLogger(FILE)).length_ns(logs(4.5), 0) == LENGTHS_NS[1]

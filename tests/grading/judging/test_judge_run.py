@@ -20,7 +20,7 @@ from grader.grading.model.report import ExerciseReport, Verdict
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import ClockKind, FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, FaultKind, Trace
 from grader.testing import TraceBuilder
 
 FILE = "velocity_publisher.py"
@@ -71,6 +71,23 @@ def judged(*criteria: Criterion, rec: Recording | None = None, **rest: Any) -> d
     trace = (rec or Recording()).trace(**rest)
     report = judge_exercise(exercise(*criteria), {"alone": trace}, handed_in(FILE))
     return {v.id: v for v in report.verdicts}
+
+
+@dataclass(frozen=True)
+class Looks(Says):
+    """A check that is met by a trace which says nothing of what the grader thinks."""
+
+    def judge(self, trace: Trace) -> Finding:
+        """Look for it."""
+        return Finding(Fraction(not isinstance(trace, AssessedTrace)), "")
+
+
+def test_no_check_can_read_what_the_grader_thinks() -> None:
+    """It is handed what was recorded, and always the same object, so that what it computes is kept."""
+    assert judged(criterion("a", Looks()))["a"].outcome is Outcome.MET
+    assessed = Recording().trace()
+    assert assessed.recorded is assessed.recorded
+    assert AssessedTrace.unremarkable(assessed.recorded) == assessed
 
 
 def outcomes(report: ExerciseReport) -> dict[str, str]:

@@ -26,7 +26,7 @@ from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace, Trace
 
 FILE = "node.py"
 CHECKS = known_checks()
@@ -57,7 +57,7 @@ def exercise(check: Check, scale: Scale | None, draws: int = 1) -> Exercise:
     return Exercise("one", "1", "One", True, (FILE,), scenarios, (criterion,), "sha256:0", draws=again)
 
 
-def errors(*values: float) -> Trace:
+def errors(*values: float) -> AssessedTrace:
     """Record some numbers."""
     recording = Recording(10)
     for number, value in enumerate(values):
@@ -66,8 +66,8 @@ def errors(*values: float) -> Trace:
 
 
 def judged(
-    scale: Scale | None, *traces: Trace, check: Check | None = None
-) -> tuple[ExerciseReport, Mapping[str, Trace]]:
+    scale: Scale | None, *traces: AssessedTrace, check: Check | None = None
+) -> tuple[ExerciseReport, Mapping[str, AssessedTrace]]:
     """Judge one recording of each draw."""
     asked = exercise(check or Error(), scale, len(traces))
     recorded = {s.id: trace for s, trace in zip(asked.scenarios, traces, strict=True)}

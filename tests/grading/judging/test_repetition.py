@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from grader.grading.judging.repetition import events, first_difference
 from grader.grading.model.verification import Cause, Difference, DifferenceKind
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Delivery,
     Endpoint,
@@ -26,7 +27,6 @@ from grader.runtime.model.trace import (
     Request,
     Start,
     StartWay,
-    Trace,
 )
 from grader.runtime.model.trace import Tested as Outcome
 
@@ -57,11 +57,11 @@ def seen(t_ns: int, *nodes: str, participant: int = 0) -> GraphSnapshot:
     return GraphSnapshot(t_ns, nodes, ends)
 
 
-def trace(*observations: Observation, **rest: Any) -> Trace:
-    return Trace("alone", ClockKind.VIRTUAL, 10**10, observations, **rest)
+def trace(*observations: Observation, **rest: Any) -> AssessedTrace:
+    return AssessedTrace("alone", ClockKind.VIRTUAL, 10**10, observations, **rest)
 
 
-def between(first: Trace, other: Trace, source: str = SOURCE) -> Difference:
+def between(first: AssessedTrace, other: AssessedTrace, source: str = SOURCE) -> Difference:
     found = first_difference(first, other, {"talker.py": source})
     assert found is not None
     return found
@@ -151,7 +151,7 @@ def test_every_part_of_a_recording_is_compared_or_left_out_on_purpose() -> None:
     same_by_plan = {"scenario", "clock"}
     failures = {"harness_problem", "suspected", "author_mistake", "unchecked"}  # then nothing is compared
     measured = {"may_drift", "most_starved_ns", "all_starved_ns", "incomplete", "other_numpy"}
-    names = {field.name for field in fields(Trace) if field.init}
+    names = {field.name for field in fields(AssessedTrace) if field.init}
     assert names == compared | same_by_plan | failures | measured
 
 

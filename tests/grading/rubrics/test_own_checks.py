@@ -36,7 +36,7 @@ from grader.grading.rubrics.loader import RubricMistakes, read_rubric, side_file
 from grader.runtime.model.author_files import run_author_file
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.testing import TraceBuilder, judge
 
 FLOAT = "std_msgs/msg/Float32"
@@ -56,7 +56,7 @@ def flow(start_s: float = 0.1) -> TraceBuilder:
     return TraceBuilder("pump.py", stop_s=2.0).messages("/flow", FLOAT, {"data": 1.5}, rate_hz=10, start_s=start_s)
 
 
-def verdict(path: Path, trace: Trace) -> Verdict:
+def verdict(path: Path, trace: AssessedTrace) -> Verdict:
     submission = Submission("s", "s", Path("s"), "sha256:1", {"pump.py": StudentFile("pump.py", "pump.py")})
     (found,) = judge_exercise(read_rubric(path), {"alone": trace}, submission).verdicts
     return found
@@ -264,7 +264,7 @@ def test_the_examples_on_the_page_about_own_checks_work() -> None:
     scale = Scale(1.0, 3.0, "mean")
     criterion = Criterion("away", "", Fraction(1), "alone", check, scale=scale)
 
-    def at(*distances: float) -> Trace:
+    def at(*distances: float) -> AssessedTrace:
         trace = TraceBuilder("planner.py")
         for second, x in enumerate(distances):
             fields = {"pose": {"position": {"x": x, "y": 0.0, "z": 0.0}}}

@@ -19,7 +19,7 @@ from grader.grading.model.report import ExerciseReport
 from grader.grading.rubrics.loader import read_rubric, side_files
 from grader.runtime.model.errors import RubricError
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.testing import TraceBuilder, explain
 
 FLOAT = "std_msgs/msg/Float32"
@@ -48,12 +48,12 @@ def write(folder: Path, hints: str = HINTS, rubric: str = WITH_HINTS) -> Path:
     return write_rubric(folder, rubric)
 
 
-def late(start_s: float = 1.0) -> Trace:
+def late(start_s: float = 1.0) -> AssessedTrace:
     trace = TraceBuilder("pump.py", stop_s=2.0).messages("/flow", FLOAT, {"data": 1.5}, rate_hz=1, start_s=start_s)
     return trace.trace()
 
 
-def report(path: Path, trace: Trace | None = None, source: str = PUMP) -> ExerciseReport:
+def report(path: Path, trace: AssessedTrace | None = None, source: str = PUMP) -> ExerciseReport:
     submission = Submission("s", "s", Path("s"), "sha256:1", {"pump.py": StudentFile("pump.py", "pump.py")})
     return judge_exercise(read_rubric(path), {"alone": trace or late()}, submission, {"pump.py": source})
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from tiers import but, more
 
-from grader.runtime.model.trace import ClockKind, FaultKind, OutputLine, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, FaultKind, OutputLine
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -74,10 +74,10 @@ rclpy.spin(node)
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
 
-    def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
+    def run_all(*programs: str, clock: str, **fields: Any) -> AssessedTrace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
         trace = record(session, tmp_path / "s", *whole, clock=clock, **{"duration_ns": 4 * NS_PER_S, **fields})
         assert trace.harness_problem == ""
@@ -86,7 +86,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_all
 
 
-def said(trace: Trace, process: str = "a.py") -> list[tuple[float, str]]:
+def said(trace: AssessedTrace, process: str = "a.py") -> list[tuple[float, str]]:
     """Return what a program wrote, with the time in seconds."""
     lines = [o for o in trace.observations if isinstance(o, OutputLine) and o.process == process]
     return [(round(line.t_ns / NS_PER_S, 3), line.text) for line in lines]
@@ -97,7 +97,7 @@ def _ms(text: str) -> int:
 
 
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
-def test_a_simulated_clock_follows_the_messages_on_clock(run: Callable[..., Trace], clock: str) -> None:
+def test_a_simulated_clock_follows_the_messages_on_clock(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Timers, rates and sleeps of a node with use_sim_time are as fast as /clock; the wall clock only starts later."""
     program = """
     node.create_timer(1.0, lambda: say(f"timer {simulated_ms()}"))
@@ -127,7 +127,9 @@ def test_a_simulated_clock_follows_the_messages_on_clock(run: Callable[..., Trac
 
 
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
-def test_without_messages_on_clock_a_simulated_clock_stands_still(run: Callable[..., Trace], clock: str) -> None:
+def test_without_messages_on_clock_a_simulated_clock_stands_still(
+    run: Callable[..., AssessedTrace], clock: str
+) -> None:
     """The classical mistake: use_sim_time without a simulation. No timer fires, until the parameter is taken back."""
     program = """
     fired = []
@@ -152,7 +154,7 @@ def test_without_messages_on_clock_a_simulated_clock_stands_still(run: Callable[
 
 
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"])])
-def test_callbacks_are_told_when_their_messages_were_sent(run: Callable[..., Trace], clock: str) -> None:
+def test_callbacks_are_told_when_their_messages_were_sent(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Also if the program sleeps meanwhile, and if it sent them itself.
 
     On the wall clock, what a busy machine takes is unknown, but each message was sent while it was being published.
@@ -212,7 +214,7 @@ def test_callbacks_are_told_when_their_messages_were_sent(run: Callable[..., Tra
 
 
 @pytest.mark.long
-def test_a_watched_deadline_needs_the_wall_clock(run: Callable[..., Trace]) -> None:
+def test_a_watched_deadline_needs_the_wall_clock(run: Callable[..., AssessedTrace]) -> None:
     """The middleware times deadlines itself; virtual time would never miss one, and says so."""
     program = """
     node = Node("deadline")
@@ -234,7 +236,7 @@ def test_a_watched_deadline_needs_the_wall_clock(run: Callable[..., Trace]) -> N
     assert {text for _, text in said(wall)} == {"missed"}
 
 
-def test_events_that_time_does_not_bring_stay_in_virtual_time(run: Callable[..., Trace]) -> None:
+def test_events_that_time_does_not_bring_stay_in_virtual_time(run: Callable[..., AssessedTrace]) -> None:
     """A deadline that nobody watches, and callbacks for what discovery finds."""
     program = """
     node = Node("matched")
@@ -265,7 +267,7 @@ POLLING = {
 
 @pytest.mark.breadth(1, 2)
 @pytest.mark.parametrize("loop", but([POLLING["spin_once"]], POLLING.values()), ids=POLLING)
-def test_a_timer_that_is_polled_fires_on_time(run: Callable[..., Trace], loop: str) -> None:
+def test_a_timer_that_is_polled_fires_on_time(run: Callable[..., AssessedTrace], loop: str) -> None:
     """Although time passes in larger steps for a program that polls: never beyond its next timer."""
     program = """
         from rclpy.executors import SingleThreadedExecutor

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from tiers import NIGHTLY, more
 
-from grader.runtime.model.trace import FaultKind, LogRecord, OutputLine, Trace, unmet_policy
+from grader.runtime.model.trace import AssessedTrace, FaultKind, LogRecord, OutputLine, unmet_policy
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -123,10 +123,10 @@ ASKS_MORE = "New subscription discovered on topic '/count', requesting incompati
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
 
-    def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
+    def run_all(*programs: str, clock: str, **fields: Any) -> AssessedTrace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
         trace = record(session, tmp_path / "s", *whole, clock=clock, **{"duration_ns": 4 * NS_PER_S, **fields})
         assert (trace.harness_problem, trace.incomplete) == ("", False)
@@ -136,18 +136,18 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_all
 
 
-def said(trace: Trace, process: str) -> list[tuple[float, str]]:
+def said(trace: AssessedTrace, process: str) -> list[tuple[float, str]]:
     """Return what a program printed, with the time in seconds."""
     lines = [o for o in trace.observations if isinstance(o, OutputLine) and o.process == process]
     return [(round(line.t_ns / NS_PER_S, 3), line.text) for line in lines if line.stream == "stdout"]
 
 
-def last_of(trace: Trace, process: str) -> dict[str, str]:
+def last_of(trace: AssessedTrace, process: str) -> dict[str, str]:
     """Return the last that a program said of each topic and kind of event."""
     return {text.rpartition(" ")[0]: text.rpartition(" ")[2] for _, text in said(trace, process)}
 
 
-def warnings(trace: Trace, process: str) -> list[tuple[float, str]]:
+def warnings(trace: AssessedTrace, process: str) -> list[tuple[float, str]]:
     """Return the warnings of rclpy in the log of a program, with the time in seconds."""
     found = [o for o in trace.observations if isinstance(o, LogRecord) and (o.process, o.severity) == (process, "WARN")]
     return [(round(o.t_ns / NS_PER_S, 3), o.text.partition(". ")[0]) for o in found]
@@ -156,7 +156,7 @@ def warnings(trace: Trace, process: str) -> list[tuple[float, str]]:
 @pytest.mark.rule(15)
 @CLOCKS
 @pytest.mark.parametrize("first", ["offering", *more(["requesting"])])
-def test_both_ends_learn_which_policy_does_not_fit(run: Callable[..., Trace], clock: str, first: str) -> None:
+def test_both_ends_learn_which_policy_does_not_fit(run: Callable[..., AssessedTrace], clock: str, first: str) -> None:
     """In either order; matches are told beside it, of which a publisher has one more with the grader's own node.
 
     The middleware of Jazzy tells of no types that differ.
@@ -173,7 +173,7 @@ def test_both_ends_learn_which_policy_does_not_fit(run: Callable[..., Trace], cl
         assert {at for name in ("a.py", "b.py") for at, _ in said(trace, name)} == {0.0}
 
 
-def test_the_graph_knows_each_policy(run: Callable[..., Trace]) -> None:
+def test_the_graph_knows_each_policy(run: Callable[..., AssessedTrace]) -> None:
     """What keeps two ends apart is told from their endpoints in the graph, for reports and drawings."""
     trace = run(OFFERING, REQUESTING, clock="virtual", duration_ns=NS_PER_S // 2)
     unmet = {
@@ -194,7 +194,7 @@ def test_the_graph_knows_each_policy(run: Callable[..., Trace]) -> None:
 
 
 @MOSTLY_VIRTUAL
-def test_rclpy_warns_at_both_ends(run: Callable[..., Trace], clock: str) -> None:
+def test_rclpy_warns_at_both_ends(run: Callable[..., AssessedTrace], clock: str) -> None:
     """The warnings come at once, also in a program that nothing else wakes."""
     talking = """
     node = Node("talking")
@@ -210,7 +210,7 @@ def test_rclpy_warns_at_both_ends(run: Callable[..., Trace], clock: str) -> None
 
 @pytest.mark.long
 @CLOCKS
-def test_later_endpoints_are_told_when_they_appear(run: Callable[..., Trace], clock: str) -> None:
+def test_later_endpoints_are_told_when_they_appear(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Each of three publishers at its time, and what has gone is still counted; a program may act on nothing else."""
     later = """
     node = Node("later")
@@ -241,7 +241,7 @@ def test_later_endpoints_are_told_when_they_appear(run: Callable[..., Trace], cl
 
 @pytest.mark.long
 @MOSTLY_VIRTUAL
-def test_of_three_ends_one_fits(run: Callable[..., Trace], clock: str) -> None:
+def test_of_three_ends_one_fits(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Each message counts once, whatever QoS the publishers of the topic have; the grader's node is no stranger."""
     mixed = """
     node = Node("mixed")
@@ -268,7 +268,7 @@ def test_of_three_ends_one_fits(run: Callable[..., Trace], clock: str) -> None:
 
 @pytest.mark.long
 @MOSTLY_VIRTUAL
-def test_endpoints_of_one_process_are_told_of_each_other(run: Callable[..., Trace], clock: str) -> None:
+def test_endpoints_of_one_process_are_told_of_each_other(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Also in one node, and once it spins."""
     both = """
     node = Node("both")
@@ -286,7 +286,7 @@ def test_endpoints_of_one_process_are_told_of_each_other(run: Callable[..., Trac
 
 @pytest.mark.long
 @CLOCKS
-def test_who_goes_is_told(run: Callable[..., Trace], clock: str) -> None:
+def test_who_goes_is_told(run: Callable[..., AssessedTrace], clock: str) -> None:
     """A program that waits for its counterpart to come and to go, and does nothing else."""
     leaving = """
     node = Node("leaving")
@@ -308,7 +308,7 @@ def test_who_goes_is_told(run: Callable[..., Trace], clock: str) -> None:
 
 @pytest.mark.long
 @MOSTLY_VIRTUAL
-def test_nobody_is_told_who_does_not_want_to_know(run: Callable[..., Trace], clock: str) -> None:
+def test_nobody_is_told_who_does_not_want_to_know(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Without default callbacks there are no events, and nothing is waited for."""
     deaf = """
     node = Node("deaf")
@@ -322,7 +322,7 @@ def test_nobody_is_told_who_does_not_want_to_know(run: Callable[..., Trace], clo
 
 
 @CLOCKS
-def test_services_see_each_other_if_both_ways_fit(run: Callable[..., Trace], clock: str) -> None:
+def test_services_see_each_other_if_both_ways_fit(run: Callable[..., AssessedTrace], clock: str) -> None:
     """A request may arrive and its answer not; rclpy has no events of services, and a client waits in vain."""
     serving = """
     node = Node("serving")
@@ -359,7 +359,7 @@ def test_services_see_each_other_if_both_ways_fit(run: Callable[..., Trace], clo
 
 @pytest.mark.long
 @MOSTLY_VIRTUAL
-def test_best_available_takes_what_is_there(run: Callable[..., Trace], clock: str) -> None:
+def test_best_available_takes_what_is_there(run: Callable[..., AssessedTrace], clock: str) -> None:
     """The profile that adapts to the endpoints that exist is the same whenever the middleware finds them."""
     talking = """
     node = Node("talking")
@@ -381,7 +381,7 @@ def test_best_available_takes_what_is_there(run: Callable[..., Trace], clock: st
 
 
 @pytest.mark.long
-def test_a_watched_lease_needs_the_wall_clock(run: Callable[..., Trace]) -> None:
+def test_a_watched_lease_needs_the_wall_clock(run: Callable[..., AssessedTrace]) -> None:
     """The middleware times it, as it does deadlines; on its own clock it tells who lives and who does not."""
     program = """
     node = Node("leased")

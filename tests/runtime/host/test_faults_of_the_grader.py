@@ -11,13 +11,13 @@ import pytest
 from hostile import record
 from tiers import each
 
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
 
 S = 1_000_000_000
-Run = Callable[..., Trace]
+Run = Callable[..., AssessedTrace]
 
 #: Statements that raise, for the body of a callback, with what the program reads of it. Each ends in a function that
 #: the grader puts in place of one of rclpy or of the standard library.
@@ -105,7 +105,7 @@ rclpy.spin(node)
 
 @pytest.fixture
 def run(one_worker: RecordingSession, tmp_path: Path) -> Run:
-    def run_one(source: str, **fields: Any) -> Trace:
+    def run_one(source: str, **fields: Any) -> AssessedTrace:
         return record(one_worker, tmp_path / "s", source, duration_ns=S, **fields)
 
     tmp_path.chmod(0o755)

@@ -10,7 +10,7 @@ import pytest
 from hostile import printed
 from tiers import more
 
-from grader.runtime.model.trace import Fault, FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, Fault, FaultKind
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -60,10 +60,10 @@ print("all tried", flush=True)
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
 
-    def run_one(program: str, clock: str = "virtual") -> Trace:
+    def run_one(program: str, clock: str = "virtual") -> AssessedTrace:
         trace = record(session, tmp_path / "s", textwrap.dedent(program), clock=clock, duration_ns=4 * NS_PER_S)
         assert trace.harness_problem == ""
         return trace
@@ -79,7 +79,7 @@ def plainly(program: str) -> list[str]:
 
 @pytest.mark.long
 @CLOCKS
-def test_what_is_replaced_can_be_pickled_as_before(run: Callable[..., Trace], clock: str) -> None:
+def test_what_is_replaced_can_be_pickled_as_before(run: Callable[..., AssessedTrace], clock: str) -> None:
     """A program may hand `time.sleep` to another process."""
     found = printed(run(PICKLING, clock))
     assert set(found) <= set(plainly(PICKLING))
@@ -87,12 +87,12 @@ def test_what_is_replaced_can_be_pickled_as_before(run: Callable[..., Trace], cl
 
 
 @CLOCKS
-def test_a_method_without_its_object_fails_as_before(run: Callable[..., Trace], clock: str) -> None:
+def test_a_method_without_its_object_fails_as_before(run: Callable[..., AssessedTrace], clock: str) -> None:
     """A program may call `Node.__init__("talker")` where it means `super()`."""
     assert printed(run(UNBOUND, clock)) == plainly(UNBOUND)
 
 
-def test_such_a_program_is_at_fault_itself(run: Callable[..., Trace]) -> None:
+def test_such_a_program_is_at_fault_itself(run: Callable[..., AssessedTrace]) -> None:
     """Nothing in it counts as a fault of the grader."""
     fault = run("from rclpy.node import Node\nNode.__init__('talker')").of(Fault)[0]
     assert fault.kind is FaultKind.EXCEPTION
@@ -119,7 +119,7 @@ rclpy.spin_once(node, timeout_sec=1.0)
 
 
 @CLOCKS
-def test_a_message_in_place_of_its_class_serves_as_before(run: Callable[..., Trace], clock: str) -> None:
+def test_a_message_in_place_of_its_class_serves_as_before(run: Callable[..., AssessedTrace], clock: str) -> None:
     """To subscribe, not to publish."""
     trace = run(INSTANCES, clock)
     assert printed(trace) == plainly(INSTANCES)

@@ -16,7 +16,7 @@ from places import TESTS
 from side_by_side import rows_of
 
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 
@@ -46,7 +46,7 @@ def plan(folder: Path, name: str, clock: str = "virtual") -> Plan:
     return planned(folder, *texts, clock=clock, duration_ns=5 * NS_PER_S)
 
 
-def told_on(clock: str, trace: Trace) -> Told:
+def told_on(clock: str, trace: AssessedTrace) -> Told:
     """Return what a program did beside its partner on a clock."""
     assert (trace.harness_problem, trace.clock.value) == ("", clock)
     assert trace.clock_reason == "" or clock == "wall"
@@ -56,7 +56,7 @@ def told_on(clock: str, trace: Trace) -> Told:
 @pytest.mark.breadth(8, 14)
 @rows_of(plan)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(n, name)) for n, name in enumerate(NAMES)])
-def test_what_a_program_does_in_virtual_time(trace: Trace, name: str) -> None:
+def test_what_a_program_does_in_virtual_time(trace: AssessedTrace, name: str) -> None:
     """As it is written down; and virtual time suits it."""
     found = told_on("virtual", trace)
     known: dict[str, Any] = json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}

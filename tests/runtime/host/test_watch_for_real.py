@@ -10,7 +10,7 @@ from side_by_side import rows_of
 from tiers import but
 
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 
@@ -53,7 +53,7 @@ def plan(folder: Path, does: str, **_: object) -> Plan:
 @rows_of(plan, session="session_in_tier")
 @pytest.mark.usefixtures("session_in_tier")
 @pytest.mark.parametrize(("does", "told"), but(DEFAULT, DOES.values()), ids=DOES)
-def test_what_is_told_of_a_program(trace: Trace, does: str, told: tuple[str, ...]) -> None:
+def test_what_is_told_of_a_program(trace: AssessedTrace, does: str, told: tuple[str, ...]) -> None:
     """A program of which something is told is recorded again as a bare process."""
     assert [log.text for log in trace.records()] == ["done"], trace.faults()
     assert trace.reached == told

@@ -18,14 +18,14 @@ from grader.runtime.host.protocol import MOST_WRITTEN, FilesWritten
 from grader.runtime.host.written import ALL_BYTES, FILE_BYTES
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB
-from grader.runtime.model.trace import ClockKind, Trace, WrittenFile
+from grader.runtime.model.trace import AssessedTrace, ClockKind, WrittenFile
 from grader.runtime.recording.recording_file import recording_bytes, trace_of
 from grader.runtime.session import RecordingSession
 from grader.runtime.worker.beside import MOST_OF_SUBMISSION, whole_submission
 from grader.runtime.worker.student_process import written_files
 
 S = 1_000_000_000
-Run = Callable[..., Trace]
+Run = Callable[..., AssessedTrace]
 
 WRITES = """
 import csv, os, pathlib
@@ -44,7 +44,7 @@ print("after", sorted(path.name for path in here.iterdir()), os.getcwd() == str(
 
 @pytest.fixture
 def run(session_in_tier: RecordingSession, tmp_path: Path) -> Run:
-    def run_one(*programs: str, **fields: Any) -> Trace:
+    def run_one(*programs: str, **fields: Any) -> AssessedTrace:
         (tmp_path / "s").mkdir(exist_ok=True)
         (tmp_path / "s" / "table.txt").write_text("as handed in", encoding="utf-8")
         return record(session_in_tier, tmp_path / "s", *programs, **{"duration_ns": S, **fields})
@@ -53,7 +53,7 @@ def run(session_in_tier: RecordingSession, tmp_path: Path) -> Run:
     return run_one
 
 
-def kept(trace: Trace) -> dict[tuple[str, str], bytes]:
+def kept(trace: AssessedTrace) -> dict[tuple[str, str], bytes]:
     return {(file.process, file.name): base64.b64decode(file.content) for file in trace.written}
 
 
@@ -163,7 +163,7 @@ def test_a_program_of_a_package_works_in_an_empty_folder(session_in_tier: Record
 def test_files_are_attachments_of_the_recording() -> None:
     """Under the names of process and file; the trace holds them too, so a recording can be verified."""
     written = (WrittenFile("a.py", "log.txt", base64.b64encode(b"hello").decode()),)
-    trace = Trace("alone", ClockKind.VIRTUAL, S, (), written=written)
+    trace = AssessedTrace("alone", ClockKind.VIRTUAL, S, (), written=written)
     recording, _ = recording_bytes(trace, {"environment": json.dumps({"ros_distro": "jazzy"})}, "x.mcap")
     assert trace_of(recording) == trace
     found = {a.name: a.data for a in make_reader(io.BytesIO(recording)).iter_attachments()}

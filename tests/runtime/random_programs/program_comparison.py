@@ -12,7 +12,7 @@ from program_description import Program, Spinning
 from program_model import Expected, expected_of
 from program_text import file_of
 
-from grader.runtime.model.trace import Fault, LogRecord, Message, OutputLine, Trace
+from grader.runtime.model.trace import AssessedTrace, Fault, LogRecord, Message, OutputLine
 from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 from grader.runtime.supervisor.supervisor import Job
@@ -51,7 +51,7 @@ def plan_of(program: Program, folder: Path, clock: str = "virtual") -> Plan:
     )
 
 
-def recorded(session: RecordingSession, program: Program, folder: Path, clock: str = "virtual") -> Trace:
+def recorded(session: RecordingSession, program: Program, folder: Path, clock: str = "virtual") -> AssessedTrace:
     """Record a program."""
     return session.recorder.record([Job("random", plan_of(program, folder, clock))], lambda _: None)[0]
 
@@ -73,7 +73,7 @@ def told_by_model(expected: Expected) -> dict[str, list[tuple[int, str]]]:
     return told | {f"end of p{n}.py": [(t, f"{e.kind}: {e.text}")] for n, (t, e) in expected.ends.items()}
 
 
-def told_by_trace(trace: Trace) -> dict[str, list[tuple[int, str]]]:
+def told_by_trace(trace: AssessedTrace) -> dict[str, list[tuple[int, str]]]:
     """Return what was recorded, by the name of what is compared."""
     told: dict[str, list[tuple[int, str]]] = {}
     for seen in trace.observations:
@@ -99,7 +99,7 @@ def number_in(value: Mapping[str, Any]) -> Any:
     return sum(value["feedback"]["sequence"]) if "feedback" in value else value.get("data")
 
 
-def problems(trace: Trace) -> list[str]:
+def problems(trace: AssessedTrace) -> list[str]:
     """Return what a recording itself complains about."""
     return [*trace.notes, *([trace.harness_problem] if trace.harness_problem else [])]
 
@@ -137,7 +137,7 @@ def _shown(entries: Sequence[tuple[int, str]]) -> str:
     return "; ".join(f"{t / NS_PER_MS:g} ms {text}" for t, text in entries) or "nothing"
 
 
-def differences_of(program: Program, trace: Trace) -> list[str]:
+def differences_of(program: Program, trace: AssessedTrace) -> list[str]:
     """Return how a recording in virtual time differs from the model of its program."""
     expected, did = told_by_model(expected_of(program)), told_by_trace(trace)
     return [*problems(trace), *differences(by_source(expected, program), by_source(did, program))]

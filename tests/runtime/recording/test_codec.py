@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Delivery,
     Endpoint,
@@ -30,7 +31,6 @@ from grader.runtime.model.trace import (
     ServiceEnd,
     Start,
     StartWay,
-    Trace,
 )
 from grader.runtime.recording.codec import observation_to_json, trace_to_json
 from grader.runtime.recording.packed import pack_trace, trace_from_json, unpack_trace
@@ -83,7 +83,7 @@ OBSERVATIONS = {
     Mark: st.builds(Mark, TIMES, TEXTS, TEXTS),
 }
 TRACES = st.builds(
-    Trace,
+    AssessedTrace,
     scenario=TEXTS,
     clock=st.sampled_from(ClockKind),
     stop_ns=TIMES,
@@ -123,21 +123,21 @@ def test_every_kind_of_observation_is_tried() -> None:
 
 @settings(deadline=None)
 @given(TRACES)
-def test_a_trace_comes_back_as_it_was(trace: Trace) -> None:
+def test_a_trace_comes_back_as_it_was(trace: AssessedTrace) -> None:
     """All kinds, NaN, infinities, whole numbers beyond 64 bits, texts that no encoding holds."""
     assert same(trace_from_json(over_the_line(trace_to_json(trace))), trace)
 
 
 @settings(deadline=None)
 @given(TRACES)
-def test_the_same_trace_is_written_in_the_same_bytes(trace: Trace) -> None:
+def test_the_same_trace_is_written_in_the_same_bytes(trace: AssessedTrace) -> None:
     """Bytes can be compared instead of traces."""
     once = json.dumps(trace_to_json(trace))
     assert json.dumps(trace_to_json(trace_from_json(json.loads(once)))) == once
 
 
 SOUND = trace_to_json(
-    Trace(
+    AssessedTrace(
         "alone",
         ClockKind.VIRTUAL,
         10,
@@ -169,7 +169,7 @@ def test_a_trace_of_an_earlier_version_says_nothing_of_starts() -> None:
 def test_a_fault_of_an_earlier_version_has_no_details() -> None:
     """It is read all the same; nothing is taken from its text."""
     fault = Fault(1, "a.py", FaultKind.EXITED, "exited with code 3", exit_code=3)
-    trace = Trace("alone", ClockKind.VIRTUAL, 10, (fault,))
+    trace = AssessedTrace("alone", ClockKind.VIRTUAL, 10, (fault,))
     now = trace_to_json(trace)
     earlier = {**now, "observations": [row[:-1] for row in now["observations"]]}
     expected = (replace(fault, exit_code=None),)
@@ -209,7 +209,7 @@ def test_damage_is_refused_or_harmless(path: Place) -> None:
             assert_types(trace_from_json(replaced(SOUND, path, wrong)))
 
 
-def assert_types(trace: Trace) -> None:
+def assert_types(trace: AssessedTrace) -> None:
     """Check that everything in a trace is of the type that its class says."""
     assert type(trace.scenario) is type(trace.clock_reason) is type(trace.harness_problem) is str
     assert type(trace.stop_ns) is int

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.runtime.model.errors import EvidenceError
-from grader.runtime.model.trace import ClockKind, Message, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Message
 from grader.runtime.recording.packed import Fields, decoded_fields, pack_trace, unpack_exactly, unpack_trace
 
 TWIST = {"linear": {"x": 0.5, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.1}}
@@ -24,9 +24,9 @@ ANY = st.recursive(
 )
 
 
-def trace(*values: dict[str, Any]) -> Trace:
+def trace(*values: dict[str, Any]) -> AssessedTrace:
     messages = tuple(Message(at, "/topic", "a_msgs/msg/Any", value) for at, value in enumerate(values))
-    return Trace("alone", ClockKind.VIRTUAL, 10**10, messages)
+    return AssessedTrace("alone", ClockKind.VIRTUAL, 10**10, messages)
 
 
 def packed(value: str, beside: str = "{}") -> bytes:

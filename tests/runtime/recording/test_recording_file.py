@@ -19,6 +19,7 @@ from rosbags.rosbag2 import Reader
 
 from grader.runtime.model.errors import EvidenceError
 from grader.runtime.model.trace import (
+    AssessedTrace,
     ClockKind,
     Delivery,
     Fault,
@@ -27,7 +28,6 @@ from grader.runtime.model.trace import (
     Mark,
     Message,
     Observation,
-    Trace,
 )
 from grader.runtime.recording.codec import trace_to_json
 from grader.runtime.recording.packed import unpack_trace
@@ -36,16 +36,16 @@ from grader.runtime.recording.recording_file import packed_trace, recording_byte
 FACTS = {"environment": '{"ros_distro": "jazzy"}', "format": "x", "seed": "7"}
 
 
-def kept(trace: Trace) -> bytes:
+def kept(trace: AssessedTrace) -> bytes:
     return recording_bytes(trace, FACTS, "a_0.mcap")[0]
 
 
-def as_text(trace: Trace) -> str:
+def as_text(trace: AssessedTrace) -> str:
     """Two traces are equal where these are; NaN is equal to itself, True is not 1."""
     return json.dumps(trace_to_json(trace))
 
 
-def bag(tmp_path: Path, trace: Trace) -> Path:
+def bag(tmp_path: Path, trace: AssessedTrace) -> Path:
     folder = tmp_path / "a"
     folder.mkdir()
     recording, metadata = recording_bytes(trace, FACTS, "a_0.mcap")
@@ -61,14 +61,14 @@ def test_every_kind_of_observation_is_tried() -> None:
 
 @settings(deadline=None)
 @given(TRACES)
-def test_a_trace_comes_back_as_it_was(trace: Trace) -> None:
+def test_a_trace_comes_back_as_it_was(trace: AssessedTrace) -> None:
     """Bytes of messages included, whatever a student's text or message holds."""
     assert as_text(trace_of(kept(trace))) == as_text(trace)
 
 
 @settings(deadline=None)
 @given(TRACES)
-def test_judging_is_given_all_but_the_bytes(trace: Trace) -> None:
+def test_judging_is_given_all_but_the_bytes(trace: AssessedTrace) -> None:
     """The quick way gives what the exact way gives."""
     quick = json.loads(as_text(unpack_trace(packed_trace(kept(trace)))))
     exact = json.loads(as_text(trace))
@@ -80,7 +80,7 @@ def test_judging_is_given_all_but_the_bytes(trace: Trace) -> None:
 
 @settings(deadline=None)
 @given(TRACES)
-def test_other_tools_open_every_recording(trace: Trace) -> None:
+def test_other_tools_open_every_recording(trace: AssessedTrace) -> None:
     """Every message is there, in order, and can be decoded by its embedded type, whatever it is made of."""
     reader = make_reader(io.BytesIO(kept(trace)), decoder_factories=[DecoderFactory()])
     decoded = list(reader.iter_decoded_messages(log_time_order=False))
@@ -117,7 +117,7 @@ def test_the_metadata_says_what_the_file_holds(tmp_path: Path) -> None:
         assert (whole.duration, whole.message_count) == (bare.duration, bare.message_count)
 
 
-def texts(trace: Trace, topic: str) -> list[Any]:
+def texts(trace: AssessedTrace, topic: str) -> list[Any]:
     """Return what a topic of the grader's own says."""
     reader = make_reader(io.BytesIO(kept(trace)), decoder_factories=[DecoderFactory()])
     return [json.loads(d.decoded_message.data) for d in reader.iter_decoded_messages(topics=[topic])]
@@ -126,7 +126,7 @@ def texts(trace: Trace, topic: str) -> list[Any]:
 def test_what_is_no_message_is_told_as_json() -> None:
     """Faults, limits, output and the graph are seen in any viewer."""
     fault = Fault(5, "a.py", FaultKind.EXCEPTION, "ValueError: no", "a.py", 3, ("a.py:3 in main",))
-    trace = Trace("s", ClockKind.WALL, 10, (fault, Mark(6, "limit", "too much")), notes=("n",))
+    trace = AssessedTrace("s", ClockKind.WALL, 10, (fault, Mark(6, "limit", "too much")), notes=("n",))
     (told,) = texts(trace, "/grader/faults")
     assert (told["kind"], told["file"], told["line"], told["frames"]) == ("exception", "a.py", 3, ["a.py:3 in main"])
     assert texts(trace, "/grader/marks") == [{"name": "limit", "detail": "too much"}]
@@ -152,7 +152,7 @@ def test_what_is_no_message_is_told_as_json() -> None:
 )
 def test_what_other_tools_cannot_read_is_told_apart(message: Message) -> None:
     """Malformed bytes, unknown types and forged topics stay out of the topics of the grader."""
-    trace = Trace("s", ClockKind.VIRTUAL, 10, (message,))
+    trace = AssessedTrace("s", ClockKind.VIRTUAL, 10, (message,))
     told = texts(trace, "/grader/undecoded")
     shown = [(row["topic"], row["type"], row["publisher"]) for row in told]
     assert shown == [(message.topic, message.type, "student")]
@@ -161,7 +161,9 @@ def test_what_other_tools_cannot_read_is_told_apart(message: Message) -> None:
 
 def test_a_number_that_the_grader_published_can_be_read() -> None:
     """It is kept as fields; the recording shows it as a message."""
-    trace = Trace("s", ClockKind.VIRTUAL, 10, (Delivery(1, "/temperature", "std_msgs/msg/Int32", {"data": 26}),))
+    trace = AssessedTrace(
+        "s", ClockKind.VIRTUAL, 10, (Delivery(1, "/temperature", "std_msgs/msg/Int32", {"data": 26}),)
+    )
     reader = make_reader(io.BytesIO(kept(trace)), decoder_factories=[DecoderFactory()])
     (found,) = list(reader.iter_decoded_messages(topics=["/temperature"]))
     assert (found.decoded_message.data, found.channel.metadata["publisher"]) == (26, "grader")
@@ -171,7 +173,7 @@ def test_log_records_keep_what_ros_knows_of_them() -> None:
     """Severity, logger, text, file, line and time."""
     record = LogRecord(1_500_000_000, "a.py", "WARN", "node", "text\0 \ud800", "pkg/a.py", 12)
     reader = make_reader(
-        io.BytesIO(kept(Trace("s", ClockKind.VIRTUAL, 10, (record,)))), decoder_factories=[DecoderFactory()]
+        io.BytesIO(kept(AssessedTrace("s", ClockKind.VIRTUAL, 10, (record,)))), decoder_factories=[DecoderFactory()]
     )
     (found,) = list(reader.iter_decoded_messages(topics=["/rosout"]))
     log = found.decoded_message
@@ -186,7 +188,7 @@ def test_log_records_keep_what_ros_knows_of_them() -> None:
     assert log.msg == "text\ufffd ?"
 
 
-WHOLE = kept(Trace("s", ClockKind.VIRTUAL, 10, tuple(twist_message(i) for i in range(3))))
+WHOLE = kept(AssessedTrace("s", ClockKind.VIRTUAL, 10, tuple(twist_message(i) for i in range(3))))
 
 
 @settings(deadline=None)
@@ -195,10 +197,10 @@ def test_damage_is_refused_or_harmless(at: int, other: bytes, cut: bool) -> None
     """Whatever stands in a file, the answer is EvidenceError or a trace, never a crash."""
     damaged = WHOLE[:at] if cut else WHOLE[:at] + other + WHOLE[at + len(other) :]
     for read in (trace_of, lambda recording: unpack_trace(packed_trace(recording))):
-        assert isinstance(trace_or_problem(damaged, read), (Trace, EvidenceError))
+        assert isinstance(trace_or_problem(damaged, read), (AssessedTrace, EvidenceError))
 
 
-def trace_or_problem(recording: bytes, read: Callable[[bytes], Trace]) -> Trace | EvidenceError:
+def trace_or_problem(recording: bytes, read: Callable[[bytes], AssessedTrace]) -> AssessedTrace | EvidenceError:
     try:
         return read(recording)
     except EvidenceError as error:

@@ -20,7 +20,7 @@ from tiers import more, tiers
 
 from grader.runtime.host.originals import wait_until
 from grader.runtime.model.errors import EnvironmentFault
-from grader.runtime.model.trace import FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, FaultKind
 from grader.runtime.recording.codec import to_json
 from grader.runtime.ros_installation import RosInstallation
 from grader.runtime.sandbox.bubblewrap import Bubblewrap
@@ -124,8 +124,8 @@ def sandbox(request: pytest.FixtureRequest, ros: RosInstallation, submission: Pa
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
-    def run_one(source: str, **fields: Any) -> Trace:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
+    def run_one(source: str, **fields: Any) -> AssessedTrace:
         return record(session, tmp_path / "s", source, duration_ns=2 * S, **fields)
 
     tmp_path.chmod(0o755)
@@ -228,7 +228,7 @@ def test_a_folder_of_a_forked_process_has_a_size_and_ends_with_it(tier: str, tmp
     assert wait_until(lambda: not any(Path(folder).exists() for folder in folders), 60)
 
 
-def test_a_program_does_not_see_the_starter(run: Callable[..., Trace]) -> None:
+def test_a_program_does_not_see_the_starter(run: Callable[..., AssessedTrace]) -> None:
     """It has the usual descriptors, path and arguments, and only the interface packages that its file names."""
     trace = run(
         hostile(
@@ -349,14 +349,14 @@ else:
 
 
 @pytest.mark.long
-def test_a_later_start_finds_no_connection(run: Callable[..., Trace]) -> None:
+def test_a_later_start_finds_no_connection(run: Callable[..., AssessedTrace]) -> None:
     """The kernel keeps the port of a closed TCP connection for a minute, so the network is not used again."""
     for _ in range(3):
         assert printed(run(LEAVES_A_CONNECTION)) == ["free"]
 
 
 @pytest.mark.parametrize("starts", [6, pytest.param(1000, marks=pytest.mark.nightly)])
-def test_nothing_of_a_start_is_found_by_a_later_one(run: Callable[..., Trace], starts: int) -> None:
+def test_nothing_of_a_start_is_found_by_a_later_one(run: Callable[..., AssessedTrace], starts: int) -> None:
     """Not in memory, modules, files or the kernel: each process is a fork of one that has run no student's code.
 
     Each start finds again whatever it has left itself, so the places are looked at in a way that would find it.
@@ -373,7 +373,7 @@ print(locale.setlocale(locale.LC_ALL, ""))
 """
 
 
-def test_the_c_library_finds_its_table_of_character_sets(run: Callable[..., Trace]) -> None:
+def test_the_c_library_finds_its_table_of_character_sets(run: Callable[..., AssessedTrace]) -> None:
     """It shares that with all processes, and looks into it when a program, or Tcl for it, sets the locale."""
     assert printed(run(READS_CHARACTER_SETS)) == ["C.UTF-8"]
 
@@ -395,7 +395,7 @@ def starters() -> list[int]:
 
 
 @pytest.mark.long
-def test_a_starter_that_is_killed_costs_no_recording(run: Callable[..., Trace]) -> None:
+def test_a_starter_that_is_killed_costs_no_recording(run: Callable[..., AssessedTrace]) -> None:
     """The recording is done again with a new worker, which has a new starter."""
     assert len(run(hostile()).messages("/cmd_vel")) > 20
     for pid in starters():
@@ -406,13 +406,13 @@ def test_a_starter_that_is_killed_costs_no_recording(run: Callable[..., Trace]) 
     assert len(trace.messages("/cmd_vel")) > 20
 
 
-def test_a_process_that_is_killed_is_told_as_killed(run: Callable[..., Trace]) -> None:
+def test_a_process_that_is_killed_is_told_as_killed(run: Callable[..., AssessedTrace]) -> None:
     """By the signal that ended it."""
     (fault,) = run(hostile(later="if self.count == 10: os.kill(os.getpid(), 9)")).faults()
     assert (fault.kind, fault.signal) == (FaultKind.KILLED, "SIGKILL")
 
 
-def test_nothing_is_left_of_a_process(run: Callable[..., Trace]) -> None:
+def test_nothing_is_left_of_a_process(run: Callable[..., AssessedTrace]) -> None:
     """Neither what it started nor its sandbox, nor an entry in the kernel's list of processes."""
     run(hostile())
     before = below()  # with what is about to end of the first recording

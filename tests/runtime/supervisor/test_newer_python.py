@@ -22,7 +22,7 @@ from grader.grading.model.report import Report
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.releases import RELEASES
-from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Start, StartWay, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, FaultKind, Start, StartWay
 from grader.runtime.recording.codec import trace_to_json
 from grader.runtime.recording.packed import pack_trace, trace_from_json, unpack_trace
 from grader.runtime.supervisor.newer_python import NEW_NAMES, NEWER, is_newer, newer_name, with_newer
@@ -217,10 +217,10 @@ def _since(body: list[ast.stmt], least: tuple[int, int]) -> Iterator[tuple[str, 
 # --- traces ---
 
 
-def failed(text: str, kind: FaultKind = FaultKind.EXCEPTION, hidden: tuple[str, ...] = ()) -> Trace:
+def failed(text: str, kind: FaultKind = FaultKind.EXCEPTION, hidden: tuple[str, ...] = ()) -> AssessedTrace:
     fault = Fault(5, "a.py", kind, text, "a.py", 3, python=HERE if kind is FaultKind.SYNTAX_ERROR else None)
     start = Start("a.py", "a.py", StartWay.SCRIPT, hidden=hidden)
-    return Trace("alone", ClockKind.VIRTUAL, 10 * NS_PER_S, (fault,), starts=(start,))
+    return AssessedTrace("alone", ClockKind.VIRTUAL, 10 * NS_PER_S, (fault,), starts=(start,))
 
 
 @older
@@ -255,7 +255,9 @@ def test_a_trace_says_what_is_newer_and_keeps_it(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_the_release_lacks_too_is_the_students(trace: Trace, distro: str, text: str, tmp_path: Path) -> None:
+def test_what_the_release_lacks_too_is_the_students(
+    trace: AssessedTrace, distro: str, text: str, tmp_path: Path
+) -> None:
     """Its Python is as old, or no Python reads it, or a file of the submission hides the module."""
     (tmp_path / "a.py").write_text(text)
     assert with_newer(trace, str(tmp_path), distro) == trace

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.trace import ClockKind, Message, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Message
 from grader.runtime.supervisor.next_recording import (
     AUTO,
     CHARGED_NOTE,
@@ -24,9 +24,9 @@ from grader.runtime.supervisor.next_recording import (
 FIRST, ON_WALL = NextRecording(may_stop=True), NextRecording(WALL)
 
 
-def recorded(clock: ClockKind = ClockKind.VIRTUAL, period_ms: int = 50) -> Trace:
+def recorded(clock: ClockKind = ClockKind.VIRTUAL, period_ms: int = 50) -> AssessedTrace:
     messages = tuple(Message(t * 10**6, "/x", "T", {}, b"") for t in range(0, 3000, period_ms))
-    return Trace("alone", clock, 3 * NS_PER_S, messages)
+    return AssessedTrace("alone", clock, 3 * NS_PER_S, messages)
 
 
 GOOD = recorded()
@@ -46,7 +46,7 @@ FROM_50_TO_60, FROM_60_TO_75 = 1 - 50 / 60, 1 - 60 / 75
 UNCLEAR_WALL = replace(BUSY, clock_reason=DRIFTS, harness_problem=UNCLEAR)
 
 
-def noted(trace: Trace, slower: float = 0) -> Trace:
+def noted(trace: AssessedTrace, slower: float = 0) -> AssessedTrace:
     """Return a recording with the time of the work as it is judged, and what share an idle machine may need less."""
     waited_ns = round(slower * trace.stop_ns)
     return replace(trace, notes=(CHARGED_NOTE,), most_starved_ns=waited_ns, all_starved_ns=waited_ns)
@@ -81,7 +81,7 @@ def noted(trace: Trace, slower: float = 0) -> Trace:
     ],
 )
 def test_what_was_recorded_says_what_is_next(
-    made: list[tuple[NextRecording, Trace]], wanted: NextRecording | Trace
+    made: list[tuple[NextRecording, AssessedTrace]], wanted: NextRecording | AssessedTrace
 ) -> None:
     """In the order in which a scenario goes through the table."""
     assert next_recording(made, AUTO) == wanted
@@ -96,6 +96,8 @@ def test_a_clock_that_was_asked_for_is_recorded_once(clock: str) -> None:
 
 
 @pytest.mark.parametrize(("made", "reason"), [([(FIRST, UNFIT)], "it waits"), ([PLAIN, COUNT], DRIFTS)])
-def test_without_the_wall_clock_its_reason_is_told(made: list[tuple[NextRecording, Trace]], reason: str) -> None:
+def test_without_the_wall_clock_its_reason_is_told(
+    made: list[tuple[NextRecording, AssessedTrace]], reason: str
+) -> None:
     """With what was recorded in virtual time."""
     assert next_recording(made, AUTO, on_wall=False) == replace(made[0][1], clock_reason=reason)

@@ -17,7 +17,7 @@ from grader.grading.judging.judge_run import judge_exercise
 from grader.grading.model.exercise import Criterion, Exercise
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import OtherNumpy, Trace
+from grader.runtime.model.trace import AssessedTrace, OtherNumpy
 from grader.runtime.recording.codec import trace_to_json
 from grader.runtime.recording.packed import trace_from_json
 from grader.runtime.supervisor import numpy_version
@@ -73,7 +73,7 @@ def outcome(text: str, trace: TraceBuilder, *, other: OtherNumpy | None = OTHER)
     alone = Scenario("alone", (FILE,), Span(10**10))
     exercise = Exercise("e", "1", "E", True, (FILE,), (alone,), (criterion,), "sha256:0")
     submission = Submission("s", "s", Path("s"), "sha256:1", {FILE: StudentFile(FILE, FILE)})
-    recorded: Mapping[str, Trace] = {"alone": replace(trace.trace(), other_numpy=other)}
+    recorded: Mapping[str, AssessedTrace] = {"alone": replace(trace.trace(), other_numpy=other)}
     (verdict,) = judge_exercise(exercise, recorded, submission, {FILE: text}).verdicts
     return verdict.outcome.value, verdict.reason
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from tiers import NIGHTLY, but
 
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.session import AUTO, VIRTUAL, RecordingSession
 from grader.runtime.supervisor.next_recording import CHARGED_NOTE, DRIFTS
 
@@ -136,14 +136,14 @@ async def main():
 asyncio.run(main())
 """,
 }
-Record = Callable[..., Trace]
+Record = Callable[..., AssessedTrace]
 
 
 @pytest.fixture
 def run(session: RecordingSession, tmp_path: Path) -> Record:
     tmp_path.chmod(0o755)
 
-    def run_one(program: str, *, clock: str = AUTO, work: float = 0.02, **fields: Any) -> Trace:
+    def run_one(program: str, *, clock: str = AUTO, work: float = 0.02, **fields: Any) -> AssessedTrace:
         whole = BEFORE.replace("{work}", library_call(work).partition("\n")[2]) + textwrap.dedent(program)
         plan = planned(tmp_path / "s", whole, duration_ns=3 * NS_PER_S, first_message_on="/pace", **fields)
         return session.record({"": Job("pace", plan)}, clock, lambda step: None)[""]
@@ -151,7 +151,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Record:
     return run_one
 
 
-def rate_hz(trace: Trace) -> float:
+def rate_hz(trace: AssessedTrace) -> float:
     times = [m.t_ns for m in trace.messages("/pace")]
     return (len(times) - 1) / (times[-1] - times[0]) * NS_PER_S
 

@@ -17,7 +17,7 @@ from grader.runtime.domains import Domains, PrivateDomains
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.plan import Plan
 from grader.runtime.ros_installation import PythonRuntime
 from grader.runtime.sandbox.exposure import View
@@ -196,7 +196,7 @@ def make(tmp_path: Path) -> Iterator[Callable[..., tuple[Recorder, Stage]]]:
         recorder.close()
 
 
-def note(trace: Trace) -> str:
+def note(trace: AssessedTrace) -> str:
     """Return what the worker of a trace said of itself."""
     assert trace.harness_problem == ""
     return trace.notes[0]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from tiers import NIGHTLY, but, more
 
-from grader.runtime.model.trace import OutputLine, Trace
+from grader.runtime.model.trace import AssessedTrace, OutputLine
 from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 
@@ -92,10 +92,10 @@ ON_THE_WALL = ("at once", "beside a spinning thread", "from a timer", "latched")
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
 
-    def run_all(*programs: str, clock: str, **fields: Any) -> Trace:
+    def run_all(*programs: str, clock: str, **fields: Any) -> AssessedTrace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
         trace = record(session, tmp_path / "s", *whole, clock=clock, **{**USUAL, **fields})
         assert trace.harness_problem == ""
@@ -104,7 +104,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_all
 
 
-def early(trace: Trace) -> list[bool]:
+def early(trace: AssessedTrace) -> list[bool]:
     """Return of each message on the topic whether it was sent before discovery."""
     return [message.before_discovery for message in trace.messages("/count")]
 
@@ -124,7 +124,7 @@ def rows(programs: dict[str, str], default: str) -> pytest.MarkDecorator:
 @pytest.mark.breadth(1, 4)
 @rows_of(plan)
 @rows(EARLY, "beside a spinning thread")
-def test_a_message_without_a_wait_is_early(trace: Trace, program: str, clock: str) -> None:
+def test_a_message_without_a_wait_is_early(trace: AssessedTrace, program: str, clock: str) -> None:
     """Only the first: those that come after a wait are heard."""
     assert trace.harness_problem == ""
     found = early(trace)
@@ -134,7 +134,7 @@ def test_a_message_without_a_wait_is_early(trace: Trace, program: str, clock: st
 
 @rows_of(plan)
 @rows(HEARD, "once there is a subscription")
-def test_a_message_after_a_wait_is_not(trace: Trace, program: str, clock: str) -> None:
+def test_a_message_after_a_wait_is_not(trace: AssessedTrace, program: str, clock: str) -> None:
     """Whatever the program has waited for; and nothing is said of it."""
     assert trace.harness_problem == ""
     assert early(trace)
@@ -142,7 +142,7 @@ def test_a_message_after_a_wait_is_not(trace: Trace, program: str, clock: str) -
     assert notes_on_unheard(trace) == ()
 
 
-def test_what_a_message_of_the_same_instant_causes_is_not_early(run: Callable[..., Trace]) -> None:
+def test_what_a_message_of_the_same_instant_causes_is_not_early(run: Callable[..., AssessedTrace]) -> None:
     """An answer in the instant in which everything begins: whoever gets a message has been discovered."""
     answering = """
     publisher = node.create_publisher(Int32, "/count", 10)
@@ -160,7 +160,7 @@ def test_what_a_message_of_the_same_instant_causes_is_not_early(run: Callable[..
 
 
 @pytest.mark.long
-def test_a_found_server_is_a_wait(run: Callable[..., Trace]) -> None:
+def test_a_found_server_is_a_wait(run: Callable[..., AssessedTrace]) -> None:
     """On a real clock the program itself is discovered meanwhile; in virtual time the server is there at once."""
     serving = """
     node.create_service(Trigger, "/own", lambda _, response: response)
@@ -177,7 +177,7 @@ def test_a_found_server_is_a_wait(run: Callable[..., Trace]) -> None:
 
 
 @pytest.mark.long
-def test_long_work_is_a_wait(run: Callable[..., Trace]) -> None:
+def test_long_work_is_a_wait(run: Callable[..., AssessedTrace]) -> None:
     """Virtual time stands still meanwhile, discovery would not."""
     working = """
     publisher = node.create_publisher(Int32, "/count", 10)
@@ -191,7 +191,7 @@ def test_long_work_is_a_wait(run: Callable[..., Trace]) -> None:
 
 
 @CLOCKS
-def test_all_of_a_burst_is_early(run: Callable[..., Trace], clock: str) -> None:
+def test_all_of_a_burst_is_early(run: Callable[..., AssessedTrace], clock: str) -> None:
     """More than are sent between two reports."""
     program = MAKE + "for number in range(30):\n    send(number)\nrclpy.spin(node)"
     trace = run(program, clock=clock)
@@ -206,7 +206,7 @@ def test_all_of_a_burst_is_early(run: Callable[..., Trace], clock: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("paces", ["node.create_timer(9, send)", "node.create_rate(10)", "rclpy.spin_once(node)"])
-def test_a_timer_begins_after_the_publishers_are_heard(run: Callable[..., Trace], paces: str) -> None:
+def test_a_timer_begins_after_the_publishers_are_heard(run: Callable[..., AssessedTrace], paces: str) -> None:
     """On the wall clock a timer that began before would send late once and in time the next time."""
     program = """
     publisher, other = (node.create_publisher(Int32, topic, 10) for topic in ("/count", "/other"))

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from hostile import hostile, record
 
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.session import RecordingSession
 
 pytestmark = pytest.mark.ros
@@ -71,7 +71,7 @@ if 20 <= self.count < 30:
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
     numbers = itertools.count()
     return lambda *programs, **fields: record(session, tmp_path / f"s{next(numbers)}", *programs, **fields)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from tiers import NIGHTLY, but, each, more
 
-from grader.runtime.model.trace import Endpoint, Trace
+from grader.runtime.model.trace import AssessedTrace, Endpoint
 from grader.runtime.plan import Plan
 from grader.runtime.session import RecordingSession
 
@@ -62,15 +62,15 @@ ENDINGS = {
 ITS_END_NS = 60 * NS_PER_S
 
 
-def numbers(trace: Trace, topic: str = "/words") -> list[int]:
+def numbers(trace: AssessedTrace, topic: str = "/words") -> list[int]:
     return [int(message.value["data"]) for message in trace.messages(topic)]
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
 
-    def run_all(*programs: str, **fields: Any) -> Trace:
+    def run_all(*programs: str, **fields: Any) -> AssessedTrace:
         whole = [BEFORE + textwrap.dedent(program) for program in programs]
         trace = record(session, tmp_path / "s", *whole, **{"duration_ns": 3 * NS_PER_S, **fields})
         assert trace.harness_problem == ""
@@ -89,7 +89,7 @@ def burst_and_end(folder: Path, ending: str) -> Plan:
 @pytest.mark.rule(16)
 @rows_of(burst_and_end)
 @pytest.mark.parametrize("ending", but(["destroy_node", "hard_exit", "killed", "exit_in_thread"], ENDINGS))
-def test_what_was_published_before_the_end_is_in_the_trace(trace: Trace, ending: str) -> None:
+def test_what_was_published_before_the_end_is_in_the_trace(trace: AssessedTrace, ending: str) -> None:
     """Ten messages at one instant, and then the end, one way or another."""
     assert trace.harness_problem == ""
     assert numbers(trace) == list(range(10)), (trace.notes, trace.faults())
@@ -107,7 +107,7 @@ def silence_and_end(folder: Path, ending: str, *, thread: bool) -> Plan:
 @rows_of(silence_and_end)
 @pytest.mark.parametrize("ending", but(["terminated"], ["hard_exit", "killed", "terminated", "aborted", "interrupted"]))
 @pytest.mark.parametrize("thread", [*more([False]), True], ids=["", "in_a_thread"])
-def test_who_ends_at_once_ends_at_its_time(trace: Trace, ending: str, *, thread: bool) -> None:
+def test_who_ends_at_once_ends_at_its_time(trace: AssessedTrace, ending: str, *, thread: bool) -> None:
     """Also where it has said nothing for a while, so that it has let time pass on its own."""
     assert trace.harness_problem == ""
     (fault,) = trace.faults()
@@ -117,7 +117,7 @@ def test_who_ends_at_once_ends_at_its_time(trace: Trace, ending: str, *, thread:
 
 @pytest.mark.parametrize("at_the_end", each(["", "raise ValueError('over')", "atexit.register(node.burst)"], 3))
 def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(
-    run: Callable[..., Trace], at_the_end: str
+    run: Callable[..., AssessedTrace], at_the_end: str
 ) -> None:
     """A node that a module still holds is freed at the very end, when nothing can be imported any more."""
     trace = run(f"""
@@ -140,7 +140,7 @@ def test_what_is_published_while_the_interpreter_ends_is_in_the_trace(
 
 
 @pytest.mark.long
-def test_a_context_manager_takes_nothing_with_it(run: Callable[..., Trace]) -> None:
+def test_a_context_manager_takes_nothing_with_it(run: Callable[..., AssessedTrace]) -> None:
     trace = run("""
         from rclpy.context import Context
         with Context() as context:
@@ -151,7 +151,7 @@ def test_a_context_manager_takes_nothing_with_it(run: Callable[..., Trace]) -> N
 
 
 @pytest.mark.rule(17)
-def test_a_publisher_made_anew_for_every_message_loses_none(run: Callable[..., Trace]) -> None:
+def test_a_publisher_made_anew_for_every_message_loses_none(run: Callable[..., AssessedTrace]) -> None:
     trace = run("""
         rclpy.init()
         node = Node('talker')
@@ -165,7 +165,7 @@ def test_a_publisher_made_anew_for_every_message_loses_none(run: Callable[..., T
 
 
 @pytest.mark.long
-def test_a_node_made_anew_after_each_shutdown_loses_nothing(run: Callable[..., Trace]) -> None:
+def test_a_node_made_anew_after_each_shutdown_loses_nothing(run: Callable[..., AssessedTrace]) -> None:
     trace = run("""
         for number in range(6):
             rclpy.init()
@@ -179,7 +179,9 @@ def test_a_node_made_anew_after_each_shutdown_loses_nothing(run: Callable[..., T
 
 
 @pytest.mark.parametrize("pause", ["", *more(["time.sleep(0.1)"])])
-def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run: Callable[..., Trace], pause: str) -> None:
+def test_what_is_still_held_after_a_shutdown_harms_no_second_start(
+    run: Callable[..., AssessedTrace], pause: str
+) -> None:
     """Without destroy_node(), publisher and client stay in the graph until they are freed."""
     trace = run(f"""
         held = []
@@ -200,7 +202,9 @@ def test_what_is_still_held_after_a_shutdown_harms_no_second_start(run: Callable
 @pytest.mark.parametrize(
     "signal", each(["os.kill(os.getpid(), signal.SIGTERM)", "signal.raise_signal(signal.SIGTERM)"], 2)
 )
-def test_a_signal_that_a_program_sends_itself_has_shut_rclpy_down(run: Callable[..., Trace], signal: str) -> None:
+def test_a_signal_that_a_program_sends_itself_has_shut_rclpy_down(
+    run: Callable[..., AssessedTrace], signal: str
+) -> None:
     """A thread of rclpy's does that, which is no faster in virtual time."""
     trace = run(TALKER + f"burst(publisher, 3)\n{signal}\nprint(rclpy.ok(), flush=True)\n")
     assert numbers(trace) == [0, 1, 2]
@@ -225,7 +229,7 @@ rclpy.spin(Listener())
         ["node.destroy_node()", "rclpy.shutdown()", "os._exit(0)", "del node, publisher\ngc.collect()"],
     ),
 )
-def test_another_node_hears_the_last_words(run: Callable[..., Trace], ending: str) -> None:
+def test_another_node_hears_the_last_words(run: Callable[..., AssessedTrace], ending: str) -> None:
     """A node of another process gets what was published just before its sender went."""
     talker = (
         "rclpy.init()\nnode = Node('talker')\npublisher = node.create_publisher(String, '/words', 10)\ntime.sleep(1)\n"
@@ -235,7 +239,7 @@ def test_another_node_hears_the_last_words(run: Callable[..., Trace], ending: st
 
 
 @pytest.mark.long
-def test_nodes_of_one_process_hear_each_others_last_words(run: Callable[..., Trace]) -> None:
+def test_nodes_of_one_process_hear_each_others_last_words(run: Callable[..., AssessedTrace]) -> None:
     trace = run("""
         rclpy.init()
         talker, listener = Node('talker'), Node('listener')
@@ -249,7 +253,7 @@ def test_nodes_of_one_process_hear_each_others_last_words(run: Callable[..., Tra
 
 
 @pytest.mark.long
-def test_a_latched_message_outlives_the_moment_it_was_sent(run: Callable[..., Trace]) -> None:
+def test_a_latched_message_outlives_the_moment_it_was_sent(run: Callable[..., AssessedTrace]) -> None:
     """A subscription that comes while its publisher is there gets it; one that comes after it has gone does not."""
     late = LISTENER.replace(", 10)\n", ", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))\n")
     talker = """
@@ -339,7 +343,9 @@ rclpy.spin(Server())
 @pytest.mark.breadth(1, 1)
 @pytest.mark.long
 @pytest.mark.parametrize("program", but([ANEW["collected"]], ANEW.values()), ids=ANEW)
-def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Callable[..., Trace], program: str) -> None:
+def test_a_client_made_anew_for_each_question_finds_the_graders_server(
+    run: Callable[..., AssessedTrace], program: str
+) -> None:
     server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
     trace = run(ASKING + textwrap.dedent(program), stimuli=(server,), duration_ns=8 * NS_PER_S)
     assert [line.text for line in trace.lines()] == ["n0", "n1", "n2"]
@@ -350,7 +356,7 @@ def test_a_client_made_anew_for_each_question_finds_the_graders_server(run: Call
 @pytest.mark.rule(18)
 @pytest.mark.parametrize("program", but([ANEW["context"]], ANEW.values()), ids=ANEW)
 def test_a_client_made_anew_for_each_question_finds_another_students_server(
-    run: Callable[..., Trace], program: str
+    run: Callable[..., AssessedTrace], program: str
 ) -> None:
     trace = run(SERVER, ASKING + textwrap.dedent(program), duration_ns=8 * NS_PER_S)
     assert [line.text for line in trace.lines()] == ["n0", "n1", "n2"]
@@ -367,7 +373,9 @@ LEAVES = {
 
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize("ending", but([LEAVES["exit"]], LEAVES.values()), ids=LEAVES)
-def test_a_server_that_answers_and_leaves_has_answered(run: Callable[..., Trace], ending: str, clock: str) -> None:
+def test_a_server_that_answers_and_leaves_has_answered(
+    run: Callable[..., AssessedTrace], ending: str, clock: str
+) -> None:
     """Its response reaches the grader, and another student's client."""
     program = f"""
 rclpy.init()
@@ -393,7 +401,7 @@ time.sleep(1)
 
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 @pytest.mark.parametrize("ending", but(["os._exit(0)"], ["node.destroy_node()", "client.destroy()", "os._exit(0)"]))
-def test_a_client_that_asks_and_leaves_has_asked(run: Callable[..., Trace], ending: str, clock: str) -> None:
+def test_a_client_that_asks_and_leaves_has_asked(run: Callable[..., AssessedTrace], ending: str, clock: str) -> None:
     server = PlannedServer("/status", "std_srvs/srv/Trigger", 0, 0, 0, cycle=False, answers=0, responses=ANSWERS)
     program = f"""
         rclpy.init()
@@ -408,7 +416,7 @@ def test_a_client_that_asks_and_leaves_has_asked(run: Callable[..., Trace], endi
 
 
 @pytest.mark.long
-def test_the_wall_clock_loses_nothing_either(run: Callable[..., Trace]) -> None:
+def test_the_wall_clock_loses_nothing_either(run: Callable[..., AssessedTrace]) -> None:
     """What reliable publishers have sent arrives before they go."""
     for ending in ("node.destroy_node()\nrclpy.shutdown()", "", "os._exit(0)"):
         trace = run(TALKER + "burst(publisher, 10)\n" + ending, clock="wall", duration_ns=ITS_END_NS)
@@ -416,7 +424,7 @@ def test_the_wall_clock_loses_nothing_either(run: Callable[..., Trace]) -> None:
 
 
 @pytest.mark.long
-def test_a_spot_check_hears_what_a_short_lived_node_says(run: Callable[..., Trace]) -> None:
+def test_a_spot_check_hears_what_a_short_lived_node_says(run: Callable[..., AssessedTrace]) -> None:
     """The subscription is there before the publisher, which is gone before a look at the graph would have shown it.
 
     The program waits until it sees the subscription, and only then creates its publisher.
@@ -444,7 +452,7 @@ def test_a_spot_check_hears_what_a_short_lived_node_says(run: Callable[..., Trac
 
 
 @pytest.mark.long
-def test_a_bare_process_sees_the_same_machine_and_no_way_to_the_grader(run: Callable[..., Trace]) -> None:
+def test_a_bare_process_sees_the_same_machine_and_no_way_to_the_grader(run: Callable[..., AssessedTrace]) -> None:
     """What replaces the answers about the machine leaves the same traces on both clocks."""
     program = """
         import sitecustomize
@@ -459,7 +467,7 @@ def test_a_bare_process_sees_the_same_machine_and_no_way_to_the_grader(run: Call
 
 
 @pytest.mark.parametrize("options", ["", *more(["signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])])
-def test_what_is_published_at_ctrl_c_counts(run: Callable[..., Trace], options: str) -> None:
+def test_what_is_published_at_ctrl_c_counts(run: Callable[..., AssessedTrace], options: str) -> None:
     """A stop in a `finally` is sent where the context is still there; rclpy's own handler has shut it down by then."""
     trace = run(
         f"""
@@ -507,7 +515,7 @@ for _ in range(5):
 
 
 @pytest.mark.parametrize("ending", but([""], ["server.destroy()", "node.destroy_node()", ""]))
-def test_an_action_server_that_leaves_has_told_everything(run: Callable[..., Trace], ending: str) -> None:
+def test_an_action_server_that_leaves_has_told_everything(run: Callable[..., AssessedTrace], ending: str) -> None:
     """Feedback and the result reach the grader's client."""
     pytest.importorskip("test_msgs")
     goal = PlannedGoal("/count", "test_msgs/action/Fibonacci", NS_PER_S, 0, {"order": 3}, (7,) * 16)
@@ -544,7 +552,7 @@ gc.collect()
 )
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
 def test_an_action_that_is_freed_while_goals_wait_for_it_is_gone(
-    run: Callable[..., Trace], clock: str, ending: str, code: int
+    run: Callable[..., AssessedTrace], clock: str, ending: str, code: int
 ) -> None:
     """As without the grader: nobody destroys the server and its client, but Python frees them with their node."""
     pytest.importorskip("test_msgs")
@@ -552,7 +560,7 @@ def test_an_action_that_is_freed_while_goals_wait_for_it_is_gone(
     assert [fault.text for fault in trace.faults()] == [f"exited with code {code}"]
 
 
-def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run: Callable[..., Trace]) -> None:
+def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run: Callable[..., AssessedTrace]) -> None:
     """In a callback, at any moment: its publisher knows it before time goes on."""
     numbers = PlannedMessages(
         "/words", "std_msgs/msg/String", 0, 0, 100 * MS, 1, False, False, tuple({"data": f"{n}"} for n in range(30))
@@ -575,7 +583,7 @@ def test_a_subscription_made_late_misses_nothing_that_comes_after_it(run: Callab
 
 
 @pytest.mark.long
-def test_a_look_at_the_graph_sees_what_is_there(run: Callable[..., Trace]) -> None:
+def test_a_look_at_the_graph_sees_what_is_there(run: Callable[..., AssessedTrace]) -> None:
     """At the first look, but an endpoint has no counterparts yet when it is created; looking in a loop takes time."""
     trace = run(
         """
@@ -605,7 +613,7 @@ def test_a_look_at_the_graph_sees_what_is_there(run: Callable[..., Trace]) -> No
 
 
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
-def test_a_node_without_a_farewell_leaves_when_its_lease_ends(run: Callable[..., Trace], clock: str) -> None:
+def test_a_node_without_a_farewell_leaves_when_its_lease_ends(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Not before, so that a node that starts meanwhile and one that was there see different graphs, as in reality."""
     ending = TALKER + "publisher.publish(String())\ntime.sleep(1.5)\nos._exit(1)"
     watching = """

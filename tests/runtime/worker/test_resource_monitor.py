@@ -15,14 +15,14 @@ from quiet_kernel import QuietKernel
 
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import MIB, NS_PER_S
-from grader.runtime.model.trace import ClockKind, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind
 from grader.runtime.usage import Activity, Usage
 from grader.runtime.worker import resource_monitor as module
 from grader.runtime.worker.resource_monitor import Budget, ResourceMonitor
 from grader.runtime.worker.socket_memory import SocketMemory
 from grader.runtime.worker.student_process import NodeProcess
 
-TRACE = Trace("alone", ClockKind.VIRTUAL, 5, ())
+TRACE = AssessedTrace("alone", ClockKind.VIRTUAL, 5, ())
 
 
 class Watched:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from tiers import each
 
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -28,11 +28,11 @@ REST = "the rest was ignored"
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     """Record a program that does harm at its 40th tick."""
     tmp_path.chmod(0o755)
 
-    def run_one(harm: str, limits: Limits | None = None, *, busy: bool = False, **fields: Any) -> Trace:
+    def run_one(harm: str, limits: Limits | None = None, *, busy: bool = False, **fields: Any) -> AssessedTrace:
         folded = "\n".join(f"    {line}" for line in harm.splitlines())
         trace = record(
             session, tmp_path / "s", hostile(later=f"if self.count == 40:\n{folded}"), limits=limits, **fields
@@ -43,14 +43,14 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_one
 
 
-def words(trace: Trace) -> str:
+def words(trace: AssessedTrace) -> str:
     """Return the only fault's text."""
     (fault,) = trace.faults()
     assert fault.t_ns >= BEGIN_NS
     return fault.text
 
 
-def test_filled_memory_is_told_as_memory(run: Callable[..., Trace]) -> None:
+def test_filled_memory_is_told_as_memory(run: Callable[..., AssessedTrace]) -> None:
     """Not as a signal from nowhere; what was published before stays in the trace."""
     trace = run("self.hoard = [bytearray(b'x' * (1 << 20)) for _ in range(5000)]", Limits(memory_bytes=256 * MIB))
     assert words(trace) == "stopped at 256 MiB of memory"
@@ -60,7 +60,7 @@ def test_filled_memory_is_told_as_memory(run: Callable[..., Trace]) -> None:
 
 
 @pytest.mark.long
-def test_memory_of_children_counts(run: Callable[..., Trace]) -> None:
+def test_memory_of_children_counts(run: Callable[..., AssessedTrace]) -> None:
     """Several processes below the limit are together above it."""
     trace = run(
         "import subprocess\n"
@@ -89,7 +89,7 @@ def test_memory_of_children_counts(run: Callable[..., Trace]) -> None:
         4,
     ),
 )
-def test_an_error_at_a_limit_names_it_and_the_line(run: Callable[..., Trace], harm: str, said: str) -> None:
+def test_an_error_at_a_limit_names_it_and_the_line(run: Callable[..., AssessedTrace], harm: str, said: str) -> None:
     """Python's own words say nothing to a beginner."""
     trace = run(harm, Limits(file_bytes=3 * MIB))
     assert said in words(trace)
@@ -98,26 +98,26 @@ def test_an_error_at_a_limit_names_it_and_the_line(run: Callable[..., Trace], ha
 
 
 @pytest.mark.long
-def test_a_full_folder_is_told(run: Callable[..., Trace]) -> None:
+def test_a_full_folder_is_told(run: Callable[..., AssessedTrace]) -> None:
     """Many files below the limit of one file fill a folder too."""
     trace = run("for n in range(9): open(f'/tmp/{n}', 'wb').write(bytes(4 << 20))")
     assert words(trace).endswith("(the limit is 16 MiB in one folder)")
 
 
 @pytest.mark.long
-def test_processor_time_is_told_as_such(run: Callable[..., Trace]) -> None:
+def test_processor_time_is_told_as_such(run: Callable[..., AssessedTrace]) -> None:
     """Counted by the system, not by what the program says."""
     assert words(run("while True: pass", Limits(processor_ns=2 * NS_PER_S))) == "stopped at 2 s of processor time"
 
 
 @pytest.mark.long
-def test_real_time_is_told_as_such(run: Callable[..., Trace]) -> None:
+def test_real_time_is_told_as_such(run: Callable[..., AssessedTrace]) -> None:
     """A node that keeps the grader waiting is at fault itself, unless the machine gave it no time."""
     trace = run("time.sleep(99)", Limits(wall_ns=5 * NS_PER_S), busy=True, clock="wall")
     assert trace.harness_problem or words(trace) == "stopped after 5 s of real time"
 
 
-def test_a_flood_of_messages_ends_the_recording_in_words(run: Callable[..., Trace]) -> None:
+def test_a_flood_of_messages_ends_the_recording_in_words(run: Callable[..., AssessedTrace]) -> None:
     """What came before the flood stays."""
     trace = run("for _ in range(30000): self.publisher.publish(Twist())", Limits(messages=500))
     (mark,) = trace.marks("limit")
@@ -128,7 +128,7 @@ def test_a_flood_of_messages_ends_the_recording_in_words(run: Callable[..., Trac
 
 
 @pytest.mark.long
-def test_a_large_message_is_counted_but_not_read(run: Callable[..., Trace]) -> None:
+def test_a_large_message_is_counted_but_not_read(run: Callable[..., AssessedTrace]) -> None:
     """Its time and topic are evidence, its five megabytes are nobody's; everything else goes on."""
     trace = run(
         "from std_msgs.msg import String\n"
@@ -143,7 +143,7 @@ def test_a_large_message_is_counted_but_not_read(run: Callable[..., Trace]) -> N
 
 
 @pytest.mark.nightly
-def test_output_without_end_is_cut_and_the_run_goes_on(run: Callable[..., Trace]) -> None:
+def test_output_without_end_is_cut_and_the_run_goes_on(run: Callable[..., AssessedTrace]) -> None:
     """A gigabyte costs the student nothing but the output."""
     trace = run("for _ in range(1000): os.write(1, b'y\\n' * (1 << 19))", Limits(output_bytes=MIB, lines=1000))
     assert len(trace.lines()) == 1000
@@ -153,7 +153,7 @@ def test_output_without_end_is_cut_and_the_run_goes_on(run: Callable[..., Trace]
 
 
 @pytest.mark.long
-def test_log_records_without_end_are_cut_and_the_run_goes_on(run: Callable[..., Trace]) -> None:
+def test_log_records_without_end_are_cut_and_the_run_goes_on(run: Callable[..., AssessedTrace]) -> None:
     """Records count as lines do."""
     trace = run("for n in range(3000): self.get_logger().info(str(n))", Limits(lines=1000))
     assert [r.text for r in trace.records()] == [str(n) for n in range(1000)]
@@ -161,7 +161,7 @@ def test_log_records_without_end_are_cut_and_the_run_goes_on(run: Callable[..., 
 
 
 @pytest.mark.long
-def test_participants_without_end_are_told(run: Callable[..., Trace]) -> None:
+def test_participants_without_end_are_told(run: Callable[..., AssessedTrace]) -> None:
     """A process may have several contexts, and not any number of them."""
     trace = run(
         "from rclpy.context import Context\n"
@@ -177,7 +177,7 @@ def test_participants_without_end_are_told(run: Callable[..., Trace]) -> None:
 
 
 @pytest.mark.long
-def test_a_hundred_and_fifty_participants_are_ended_by_their_threads(run: Callable[..., Trace]) -> None:
+def test_a_hundred_and_fifty_participants_are_ended_by_their_threads(run: Callable[..., AssessedTrace]) -> None:
     """Each brings a dozen of them; the C++ below aborts, and the fault says at which limit."""
     trace = run(
         "from rclpy.context import Context\n"
@@ -191,7 +191,7 @@ def test_a_hundred_and_fifty_participants_are_ended_by_their_threads(run: Callab
 
 
 @pytest.mark.long
-def test_endpoints_without_end_are_told(run: Callable[..., Trace]) -> None:
+def test_endpoints_without_end_are_told(run: Callable[..., AssessedTrace]) -> None:
     """The grader's node would have to subscribe to every one of them."""
     trace = run("self.many = [self.create_publisher(Twist, f'/t{n}', 10) for n in range(1500)]")
     assert [mark.detail for mark in trace.marks("limit")] == [
@@ -199,6 +199,6 @@ def test_endpoints_without_end_are_told(run: Callable[..., Trace]) -> None:
     ]
 
 
-def test_a_process_that_halts_itself_is_ended_at_once(run: Callable[..., Trace]) -> None:
+def test_a_process_that_halts_itself_is_ended_at_once(run: Callable[..., AssessedTrace]) -> None:
     """Nobody waits for it to come back."""
     assert words(run("os.kill(os.getpid(), 19)")) == "stopped: a signal had halted it for good"

@@ -21,7 +21,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from grader.runtime.host.protocol import LONGEST, LONGEST_NODE, Claim, is_name, is_node_name
 from grader.runtime.message_classes import interface_class, message_class
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.session import RecordingSession
 from grader.runtime.worker.observer import PARTICIPANTS
 from grader.runtime.worker.ros_names import ask_for_all, asked
@@ -98,7 +98,7 @@ def test_installed_types_are_found(name: str) -> None:
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     """Record programs together."""
     tmp_path.chmod(0o755)
     return lambda *programs, **fields: record(session, tmp_path / "s", *programs, **fields)
@@ -111,7 +111,7 @@ FORGED = ["//bad__name/", "/1", "/a//b", "/a/", "/" + "a" * 250]
 @pytest.mark.ros
 @pytest.mark.parametrize("name", each(FORGED, len(FORGED)))
 @pytest.mark.parametrize("kind", ["client", *more(["service"], NIGHTLY)])
-def test_a_forged_claim_costs_nobody_a_verdict(run: Callable[..., Trace], kind: str, name: str) -> None:
+def test_a_forged_claim_costs_nobody_a_verdict(run: Callable[..., AssessedTrace], kind: str, name: str) -> None:
     """The recording goes on, and so does the right node beside it."""
     claim = {"kind": kind, "name": name, "type": "std_srvs/srv/Trigger"}
     report = json.dumps({"kind": "idle", "wake_ns": None, "endpoints": [claim]})
@@ -124,7 +124,7 @@ def test_a_forged_claim_costs_nobody_a_verdict(run: Callable[..., Trace], kind: 
 
 
 @pytest.mark.ros
-def test_names_with_two_underscores_are_ordinary(run: Callable[..., Trace]) -> None:
+def test_names_with_two_underscores_are_ordinary(run: Callable[..., AssessedTrace]) -> None:
     """A topic, a service and a node."""
     harm = """
         from std_srvs.srv import Trigger
@@ -154,7 +154,7 @@ def of_types(first: int, end: int) -> str:
 @pytest.mark.nightly
 @pytest.mark.ros
 @pytest.mark.parametrize("clock", ["virtual", *more(["wall"], NIGHTLY)])
-def test_too_many_types_on_a_topic_are_a_limit_of_the_node(run: Callable[..., Trace], clock: str) -> None:
+def test_too_many_types_on_a_topic_are_a_limit_of_the_node(run: Callable[..., AssessedTrace], clock: str) -> None:
     """Which is judged; no failure of the grader."""
     trace: Any = run(
         of_types(0, 5), of_types(5, 10), clock=clock, duration_ns=(3 if clock == "virtual" else 10) * NS_PER_S

@@ -12,7 +12,7 @@ from places import TESTS
 from tiers import but
 
 from grader.runtime.model.scenario import FieldSpec
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -38,13 +38,13 @@ TEXT = "std_msgs/msg/String"
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     """Record some of the nodes beside this file, for so many seconds."""
     tmp_path.chmod(0o755)
 
     def run_one(
         files: tuple[str, ...], *stimuli: Any, seconds: int = 4, clock: str = "virtual", times: int = 1, **fields: Any
-    ) -> Trace:
+    ) -> AssessedTrace:
         (tmp_path / "s").mkdir()
         submission = stage_submission(str(NODES), files, tmp_path / "s")
         asked = Scenario("alone", files, Span(seconds * NS_PER_S), stimuli, **fields)
@@ -57,7 +57,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     return run_one
 
 
-def short(trace: Trace) -> list[str]:
+def short(trace: AssessedTrace) -> list[str]:
     """Return what was asked, answered, logged and marked, in short, with its milliseconds."""
     found = []
     for o in trace.observations:
@@ -71,7 +71,7 @@ def short(trace: Trace) -> list[str]:
     return found
 
 
-def test_a_server_is_called_by_several_clients(run: Callable[..., Trace]) -> None:
+def test_a_server_is_called_by_several_clients(run: Callable[..., AssessedTrace]) -> None:
     """Calls of one instant come one after the other, always in the same order; the graph shows the server."""
     trace = run(("server.py",), ServiceCalls(BATTERY, TRIGGER, ({},), calls=2, clients=2), times=2)
     percentages = ["85.0", "84.5", "84.0", "83.5"]
@@ -86,7 +86,7 @@ def test_a_server_is_called_by_several_clients(run: Callable[..., Trace]) -> Non
     assert [(e.kind, e.service, e.node) for e in trace.graphs()[-1].services] == [("service", BATTERY, "/battery")]
 
 
-def test_a_client_waits_for_a_late_server_that_disappears(run: Callable[..., Trace]) -> None:
+def test_a_client_waits_for_a_late_server_that_disappears(run: Callable[..., AssessedTrace]) -> None:
     """It polls in virtual time; the last request stays unanswered; then it ends, which it is free to do."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, 1300 * NS_PER_MS, delay_ns=100 * NS_PER_MS, answers=2)
     trace = run(("client_loop.py",), server, seconds=20, may_exit=("client_loop.py",), times=2)
@@ -118,7 +118,7 @@ def test_a_client_waits_for_a_late_server_that_disappears(run: Callable[..., Tra
         ("client_two.py", [500, 1000, 1500, 2000, 2500, 3000, 3500]),
     ],
 )
-def test_every_way_to_ask_is_served(run: Callable[..., Trace], file: str, asked_ms: list[int]) -> None:
+def test_every_way_to_ask_is_served(run: Callable[..., AssessedTrace], file: str, asked_ms: list[int]) -> None:
     """Callbacks, await, the call that blocks in a thread, and a second client that hears what is not for it."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, delay_ns=250 * NS_PER_MS, cycle=True)
     trace = run((file,), server)
@@ -128,7 +128,7 @@ def test_every_way_to_ask_is_served(run: Callable[..., Trace], file: str, asked_
 
 
 @pytest.mark.long
-def test_a_server_asks_another_one_while_it_answers(run: Callable[..., Trace]) -> None:
+def test_a_server_asks_another_one_while_it_answers(run: Callable[..., AssessedTrace]) -> None:
     """Two callbacks of one node wait for each other, in threads."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, delay_ns=100 * NS_PER_MS)
     trace = run(("relay.py",), server, ServiceCalls(RELAY, TRIGGER, ({},), start_ns=NS_PER_S))
@@ -141,7 +141,7 @@ def test_a_server_asks_another_one_while_it_answers(run: Callable[..., Trace]) -
 
 
 @pytest.mark.long
-def test_two_processes_meet_when_one_starts_late_and_one_ends(run: Callable[..., Trace]) -> None:
+def test_two_processes_meet_when_one_starts_late_and_one_ends(run: Callable[..., AssessedTrace]) -> None:
     """And the one that is left ends at the stop signal."""
     files = ("server.py", "client_loop.py")
     late, free = (("server.py", 2500 * NS_PER_MS),), ("client_loop.py",)
@@ -154,7 +154,7 @@ def test_two_processes_meet_when_one_starts_late_and_one_ends(run: Callable[...,
 
 
 @pytest.mark.long
-def test_parameters_and_messages_of_fixed_types_reach_a_node(run: Callable[..., Trace]) -> None:
+def test_parameters_and_messages_of_fixed_types_reach_a_node(run: Callable[..., AssessedTrace]) -> None:
     """The parameter takes effect at its instant; the messages come as often as they are repeated."""
     asked: Any = {"parameters": [{"name": "word", "value": {"type": 4, "string_value": "bye"}}]}
     changed = ServiceCalls("~/set_parameters", "rcl_interfaces/srv/SetParameters", (asked,), start_ns=1200 * NS_PER_MS)
@@ -167,7 +167,7 @@ def test_parameters_and_messages_of_fixed_types_reach_a_node(run: Callable[..., 
 
 
 @pytest.mark.long
-def test_the_services_that_every_node_has_answer_at_once(run: Callable[..., Trace]) -> None:
+def test_the_services_that_every_node_has_answer_at_once(run: Callable[..., AssessedTrace]) -> None:
     """Nodes leave them out of their waits until somebody calls; the caller is another process, or the same one."""
     trace = run(("asked.py", "asker.py"), seconds=3, times=2)
     logged = [(o.t_ns // NS_PER_MS, o.text) for o in trace.observations if isinstance(o, LogRecord)]
@@ -176,7 +176,7 @@ def test_the_services_that_every_node_has_answer_at_once(run: Callable[..., Trac
 
 
 @pytest.mark.long
-def test_a_lifecycle_node_is_led_through_its_states(run: Callable[..., Trace]) -> None:
+def test_a_lifecycle_node_is_led_through_its_states(run: Callable[..., AssessedTrace]) -> None:
     """It publishes while it is active; what its state machine tells has its instant too."""
     asked: list[tuple[Any, int]] = [
         ({"transition": {"id": 0, "label": to}}, at) for to, at in (("configure", 600), ("activate", 1200))
@@ -195,7 +195,7 @@ def test_a_lifecycle_node_is_led_through_its_states(run: Callable[..., Trace]) -
 FIBONACCI, COUNT = "test_msgs/action/Fibonacci", "/count/_action"
 
 
-def test_goals_are_refused_cancelled_and_followed(run: Callable[..., Trace]) -> None:
+def test_goals_are_refused_cancelled_and_followed(run: Callable[..., AssessedTrace]) -> None:
     """An action server with threads that sleeps while it works: requests, feedback and results have their instants."""
     pytest.importorskip("test_msgs")
     refused = ActionGoal("/count", FIBONACCI, {"order": 80}, 500 * NS_PER_MS)
@@ -214,7 +214,7 @@ def test_goals_are_refused_cancelled_and_followed(run: Callable[..., Trace]) -> 
 
 
 @pytest.mark.long
-def test_the_client_of_an_action_waits_for_its_server(run: Callable[..., Trace]) -> None:
+def test_the_client_of_an_action_waits_for_its_server(run: Callable[..., AssessedTrace]) -> None:
     """Both are students; the server starts late."""
     pytest.importorskip("test_msgs")
     trace = run(("counting.py", "goal_client.py"), starts_ns=(("counting.py", NS_PER_S),), may_exit=("goal_client.py",))
@@ -242,14 +242,14 @@ CLUMSY = ("clumsy.py", "1000 AttributeError: 'Node' object has no attribute 'mot
         ],
     ),
 )
-def test_how_a_program_ends_after_ctrl_c_is_told(run: Callable[..., Trace], file: str, end: str) -> None:
+def test_how_a_program_ends_after_ctrl_c_is_told(run: Callable[..., AssessedTrace], file: str, end: str) -> None:
     """A second shutdown is normal; an exception of its own is not, and neither is to go on."""
     trace = run((file,), seconds=1, shutdown_ns=2 * NS_PER_S)
     assert [line for line in short(trace) if line.startswith(("1000", "3000"))] == [f"1000 stop_signal {file}", end]
 
 
 @pytest.mark.long
-def test_the_wall_clock_sees_the_same(run: Callable[..., Trace]) -> None:
+def test_the_wall_clock_sees_the_same(run: Callable[..., AssessedTrace]) -> None:
     """Only later by what the machine needs."""
     server = ServiceServer(BATTERY, TRIGGER, ANSWERS, 600 * NS_PER_MS, answers=1)
     trace = run(("client_callbacks.py",), server, seconds=6, clock="wall", shutdown_ns=2 * NS_PER_S)

@@ -15,7 +15,7 @@ from tiers import each
 
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import KIB, MIB, NS_PER_S
-from grader.runtime.model.trace import FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, FaultKind
 from grader.runtime.session import RecordingSession
 from grader.runtime.worker.resource_monitor import IN_SOCKETS_BYTES
 from grader.runtime.worker.socket_memory import SOCKET_BYTES, SocketMemory, descriptors, objects, socket_bytes
@@ -179,10 +179,10 @@ for _ in range(50):
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
 
-    def run_one(harm: str, *others: str, **fields: Any) -> Trace:
+    def run_one(harm: str, *others: str, **fields: Any) -> AssessedTrace:
         indented = "\n".join(f"    {line}" for line in harm.splitlines())
         harms = f"{KEEPS}\ndef harm():\n{indented}\n"
         program = hostile(before=harms, later="if self.count == 40: harm()")
@@ -208,7 +208,7 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
     ids=["pairs", "not accepted", "UDP", "pipes", "TCP"],
 )
 def test_memory_in_sockets_and_pipes_ends_the_node(
-    run: Callable[..., Trace], harm: str, words: tuple[str, ...]
+    run: Callable[..., AssessedTrace], harm: str, words: tuple[str, ...]
 ) -> None:
     """As filled memory does: in children, in connections that nobody accepts, in packets that nobody takes."""
     trace = run(
@@ -222,7 +222,7 @@ def test_memory_in_sockets_and_pipes_ends_the_node(
 
 @pytest.mark.nightly
 @pytest.mark.ros
-def test_a_node_beside_it_goes_on(run: Callable[..., Trace]) -> None:
+def test_a_node_beside_it_goes_on(run: Callable[..., AssessedTrace]) -> None:
     """Memory is charged to the one that holds it."""
     other = hostile().replace("/cmd_vel", "/other").replace("velocity_publisher", "other")
     trace = run(PAIRS_IN_CHILDREN, other, duration_ns=20 * NS_PER_S)
@@ -232,7 +232,7 @@ def test_a_node_beside_it_goes_on(run: Callable[..., Trace]) -> None:
 
 @pytest.mark.ros
 @pytest.mark.long
-def test_what_a_large_honest_node_needs_is_far_from_the_limits(run: Callable[..., Trace]) -> None:
+def test_what_a_large_honest_node_needs_is_far_from_the_limits(run: Callable[..., AssessedTrace]) -> None:
     """Loops, child processes with pipes, and a hundred sockets."""
     trace = run(
         """

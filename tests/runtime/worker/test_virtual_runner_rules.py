@@ -27,7 +27,7 @@ from grader.runtime.host.protocol import (
     MessagesArrived,
     Report,
 )
-from grader.runtime.model.trace import GraphSnapshot, Message, OutputLine, Trace
+from grader.runtime.model.trace import AssessedTrace, GraphSnapshot, Message, OutputLine
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.virtual_runner import VirtualRunner
@@ -98,7 +98,7 @@ class Run:
         if isinstance(self.observer, SlowObserver):
             self.observer.log = self.log
         students, observer = cast("list[NodeProcess]", self.students), cast("Observer", self.observer)
-        self.trace: Trace = VirtualRunner(plan(**fields), students, observer, wait=looks).run()
+        self.trace: AssessedTrace = VirtualRunner(plan(**fields), students, observer, wait=looks).run()
 
     def told(self, name: str, kind: type) -> list[int]:
         """Return at which places in the log a process was told something."""

@@ -15,7 +15,7 @@ import pytest
 from hostile import HOST_LINE
 from tiers import NIGHTLY, but, each, more
 
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -70,11 +70,11 @@ class Listener(Node):
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     """Record programs together; whatever they do, the grader does not fail."""
     tmp_path.chmod(0o755)
 
-    def run_all(*programs: str, **fields: Any) -> Trace:
+    def run_all(*programs: str, **fields: Any) -> AssessedTrace:
         trace = record(session, tmp_path / "s", *programs, **fields)
         assert trace.harness_problem == ""
         return trace
@@ -99,7 +99,9 @@ JUNK = ["send(b'x' * 100 + b'\\n')", "send(b'[' * 100000 + b'\\n')", "send(b'\\x
         *more([(said, "wall") for said in FLOODS[1:]], NIGHTLY),
     ],
 )
-def test_junk_on_the_line_ends_the_process_that_sent_it(run: Callable[..., Trace], said: str, clock: str) -> None:
+def test_junk_on_the_line_ends_the_process_that_sent_it(
+    run: Callable[..., AssessedTrace], said: str, clock: str
+) -> None:
     """Not JSON, too deep, too much: its process is ended, and everybody else goes on."""
     later = f"if self.count == 40:\n    send = line().sendall\n    {said}"
     trace = run(hostile(before=HOST_LINE, later=later), clock=clock, duration_ns=4 * NS_PER_S)
@@ -121,7 +123,7 @@ def test_junk_on_the_line_ends_the_process_that_sent_it(run: Callable[..., Trace
         5,
     ),
 )
-def test_absurd_reports_change_nothing_that_counts(run: Callable[..., Trace], report: str) -> None:
+def test_absurd_reports_change_nothing_that_counts(run: Callable[..., AssessedTrace], report: str) -> None:
     """Times, counts and places of a report are bounded before they are used; messages are those that came."""
     trace = run(hostile(before=HOST_LINE, later=f"if self.count == 40: line().sendall({report.encode()!r} + b'\\n')"))
     assert len(trace.messages("/cmd_vel")) == 199
@@ -129,7 +131,7 @@ def test_absurd_reports_change_nothing_that_counts(run: Callable[..., Trace], re
 
 
 @pytest.mark.nightly
-def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable[..., Trace]) -> None:
+def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable[..., AssessedTrace]) -> None:
     """Its process sleeps for ever, as it asked; the other one is stepped as before."""
     report = (
         '{"kind": "idle", "wake_ns": 99999999999999999999999999, "sent": {"topic /cmd_vel": 3, "topic /y": -5}, '
@@ -143,7 +145,7 @@ def test_a_report_of_the_far_future_only_ends_the_senders_own_time(run: Callable
 
 
 @pytest.mark.long
-def test_hidden_work_is_charged(run: Callable[..., Trace]) -> None:
+def test_hidden_work_is_charged(run: Callable[..., AssessedTrace]) -> None:
     """A program that has its host say that it computes nothing is for the wall clock all the same."""
     lie = "import _grader_host.virtual as virtual\nvirtual.VirtualTime._charge = lambda self: None"
     work = (
@@ -153,7 +155,7 @@ def test_hidden_work_is_charged(run: Callable[..., Trace]) -> None:
     assert "processor time" in trace.clock_reason
 
 
-def test_bytes_that_are_no_message_have_no_content(run: Callable[..., Trace]) -> None:
+def test_bytes_that_are_no_message_have_no_content(run: Callable[..., AssessedTrace]) -> None:
     """They came, and that is all: no check finds a right value in them."""
     trace = run(hostile(later="self.publisher.publish(b'\\x00\\x01\\x00\\x00\\xff')"))
     values = [m.value for m in trace.messages("/cmd_vel")]
@@ -164,7 +166,7 @@ def test_bytes_that_are_no_message_have_no_content(run: Callable[..., Trace]) ->
 
 
 @pytest.mark.long
-def test_garbage_on_the_ports_disturbs_nobody(run: Callable[..., Trace]) -> None:
+def test_garbage_on_the_ports_disturbs_nobody(run: Callable[..., AssessedTrace]) -> None:
     """Random bytes, some with the beginning of RTPS, as fast as a process can send them."""
     harm = """
         import ctypes
@@ -190,7 +192,7 @@ while True:
 
 
 @pytest.mark.long
-def test_a_clock_and_events_of_somebody_else_change_nothing(run: Callable[..., Trace]) -> None:
+def test_a_clock_and_events_of_somebody_else_change_nothing(run: Callable[..., AssessedTrace]) -> None:
     """The grader's node follows no /clock, and believes no parameter event."""
     harm = """
         from rosgraph_msgs.msg import Clock
@@ -212,7 +214,7 @@ def test_a_clock_and_events_of_somebody_else_change_nothing(run: Callable[..., T
 
 
 @pytest.mark.long
-def test_the_graders_node_offers_nothing_to_call(run: Callable[..., Trace]) -> None:
+def test_the_graders_node_offers_nothing_to_call(run: Callable[..., AssessedTrace]) -> None:
     """No parameters, no log levels, no descriptions of types: what is not there cannot be called."""
     later = """
         if self.count == 40:
@@ -224,7 +226,7 @@ def test_the_graders_node_offers_nothing_to_call(run: Callable[..., Trace]) -> N
 
 
 @pytest.mark.long
-def test_the_graders_name_gives_no_power(run: Callable[..., Trace]) -> None:
+def test_the_graders_name_gives_no_power(run: Callable[..., AssessedTrace]) -> None:
     """A node of the same name hides from the graph, which helps nobody; its messages count as everybody's."""
     later = """
         if self.count == 20:
@@ -250,7 +252,7 @@ def listener(tick: str) -> str:
 STREAM = PlannedNumbers("/temperature", "std_msgs/msg/Float32", 500 * MS, 200 * MS, 1, ((21.0, 0), (26.0, 0)) * 5)
 
 
-def test_forged_stimuli_are_no_evidence(run: Callable[..., Trace]) -> None:
+def test_forged_stimuli_are_no_evidence(run: Callable[..., AssessedTrace]) -> None:
     """What the trace calls delivered is what the grader published, not what came in its writer's name."""
     forged = listener("""
 for info in self.get_publishers_info_by_topic("/temperature"):
@@ -262,7 +264,7 @@ for info in self.get_publishers_info_by_topic("/temperature"):
 
 
 @pytest.mark.nightly
-def test_a_forged_farewell_of_the_grader_ends_no_grading(run: Callable[..., Trace]) -> None:
+def test_a_forged_farewell_of_the_grader_ends_no_grading(run: Callable[..., AssessedTrace]) -> None:
     """A student who has other nodes believe that the grader left loses what they would have been heard to say."""
     farewell = listener("""
 for info in self.get_publishers_info_by_topic("/temperature"):
@@ -280,7 +282,7 @@ print(len(self.get_node_names()), flush=True)
 
 
 @pytest.mark.nightly
-def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run: Callable[..., Trace]) -> None:
+def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run: Callable[..., AssessedTrace]) -> None:
     """The reference beside the nodes is not held up by what they send."""
     flood = hostile(
         harm="""
@@ -296,7 +298,7 @@ def test_a_flood_on_the_wall_clock_is_a_limit_and_no_failure_of_the_machine(run:
 
 
 @pytest.mark.long
-def test_a_flood_of_giants_leaves_the_grader_standing(run: Callable[..., Trace]) -> None:
+def test_a_flood_of_giants_leaves_the_grader_standing(run: Callable[..., AssessedTrace]) -> None:
     """Six megabytes at a time; each is counted, none is kept."""
     harm = (
         "from std_msgs.msg import String\nself.big = self.create_publisher(String, '/big', 100); self.String = String"
@@ -339,7 +341,7 @@ if self.count == 20:
 
 
 @pytest.mark.long
-def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[..., Trace]) -> None:
+def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[..., AssessedTrace]) -> None:
     """The middleware would note each of them: the worker is ended, and what brings two of them there is the node."""
     most_bytes = 0
     done = threading.Event()
@@ -388,7 +390,9 @@ ledger.Ledger.claims = lambda it, domain: [
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["publisher", pytest.param("client", marks=pytest.mark.nightly)])
-def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(run: Callable[..., Trace], kind: str) -> None:
+def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(
+    run: Callable[..., AssessedTrace], kind: str
+) -> None:
     """One more at each tick: in full patience the nodes' real time would be over before the scenario is."""
     ghosts = hostile(harm=GHOSTS.replace("KIND", kind), later="self.ledger.changed = True")
     trace = run(ghosts, duration_ns=4 * NS_PER_S, limits=Limits(wall_ns=60 * NS_PER_S))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from tiers import but, each
 
-from grader.runtime.model.trace import Trace
+from grader.runtime.model.trace import AssessedTrace
 from grader.runtime.session import RecordingSession
 
 pytest.importorskip("rclpy")
@@ -71,10 +71,10 @@ WORK = {
 
 
 @pytest.fixture
-def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
+def run(session: RecordingSession, tmp_path: Path) -> Callable[..., AssessedTrace]:
     tmp_path.chmod(0o755)
 
-    def run_one(harm: str, later: str, **fields: Any) -> Trace:
+    def run_one(harm: str, later: str, **fields: Any) -> AssessedTrace:
         program = hostile(harm=harm, later=later)
         return record(
             session, tmp_path / "s", program, **{"duration_ns": 3 * NS_PER_S, "stop_when_unfit": True, **fields}
@@ -86,19 +86,19 @@ def run(session: RecordingSession, tmp_path: Path) -> Callable[..., Trace]:
 @pytest.mark.breadth(1, 4)
 @pytest.mark.parametrize(("once", "later"), but([WAITS["usleep"]], WAITS.values()), ids=WAITS)
 def test_waiting_outside_of_virtual_time_is_for_the_wall_clock(
-    run: Callable[..., Trace], once: str, later: str
+    run: Callable[..., AssessedTrace], once: str, later: str
 ) -> None:
     assert run(once, later).clock_reason.startswith(OUTSIDE)  # and then what the program did, at which line
 
 
 @pytest.mark.breadth(0, 1)
 @pytest.mark.parametrize(("once", "later"), but([WORK["computing"]], WORK.values()), ids=WORK)
-def test_long_computing_is_for_the_wall_clock(run: Callable[..., Trace], once: str, later: str) -> None:
+def test_long_computing_is_for_the_wall_clock(run: Callable[..., AssessedTrace], once: str, later: str) -> None:
     assert run(once, later).clock_reason == BUSY
 
 
 @pytest.mark.long
-def test_a_rare_block_that_delays_other_timers_is_noticed(run: Callable[..., Trace]) -> None:
+def test_a_rare_block_that_delays_other_timers_is_noticed(run: Callable[..., AssessedTrace]) -> None:
     """200 ms once a second: three of twenty messages a second would come late."""
     assert run("", "if self.count % 20 == 0: __import__('ctypes').CDLL(None).usleep(200_000)").clock_reason == OUTSIDE
 
@@ -128,7 +128,7 @@ AN_ENDPOINT = "self.made = self.create_publisher(Twist, f'/x{self.count % 2}', 1
 @pytest.mark.parametrize(
     ("once", "later"), each([(HOST, ARRIVED), (HOST + MATCHING, AN_ENDPOINT)], 2), ids=["arrived", "matching"]
 )
-def test_what_a_process_says_hides_no_work(run: Callable[..., Trace], once: str, later: str) -> None:
+def test_what_a_process_says_hides_no_work(run: Callable[..., AssessedTrace], once: str, later: str) -> None:
     """That messages arrived, or that it waits for matches: neither takes as long as this."""
     assert run(once, later).clock_reason.startswith(OUTSIDE)  # and then what the program did, at which line
 
@@ -150,14 +150,14 @@ COMPUTING = library_call(0.012)
     ("once", "later"), each([(LOOP, COMPUTING), ("", AGAIN.format(COMPUTING))], 2), ids=["loop", "again"]
 )
 def test_work_that_puts_off_the_next_message_is_for_the_wall_clock(
-    run: Callable[..., Trace], once: str, later: str
+    run: Callable[..., AssessedTrace], once: str, later: str
 ) -> None:
     """Ten milliseconds fit between two ticks of a timer; a pause is counted from their end."""
     assert run(once, later).clock_reason == BUSY
 
 
 @pytest.mark.long
-def test_work_before_a_deadline_puts_off_nothing(run: Callable[..., Trace]) -> None:
+def test_work_before_a_deadline_puts_off_nothing(run: Callable[..., AssessedTrace]) -> None:
     """A loop that sleeps until its next moment makes up for its work, on either clock."""
     until = LOOP.replace("def run():\n", "def run():\n    due = time.monotonic()\n")
     until = until.replace("time.sleep(0.05)", "due += 0.05\n        time.sleep(max(0.0, due - time.monotonic()))")
@@ -183,14 +183,14 @@ threading.Thread(target=run, daemon=True).start()
 @pytest.mark.long
 @pytest.mark.parametrize(("later", "reason"), [("", ""), ("sum(range(12_000_000))", BUSY)], ids=["polls", "works"])
 def test_polls_of_a_busy_loop_are_no_work_but_work_among_them_is(
-    run: Callable[..., Trace], later: str, reason: str
+    run: Callable[..., AssessedTrace], later: str, reason: str
 ) -> None:
     """On a real clock a busy loop polls as often as there is time for, and is late by what it computes only."""
     assert run(POLLS, later).clock_reason == reason
 
 
 @pytest.mark.long
-def test_a_loop_that_only_publishes_stays_in_virtual_time(run: Callable[..., Trace]) -> None:
+def test_a_loop_that_only_publishes_stays_in_virtual_time(run: Callable[..., AssessedTrace]) -> None:
     assert run(LOOP, "self.get_logger().info('x')").clock_reason == ""
 
 
@@ -207,13 +207,13 @@ def test_a_loop_that_only_publishes_stays_in_virtual_time(run: Callable[..., Tra
         ],
     ),
 )
-def test_ordinary_nodes_stay_in_virtual_time(run: Callable[..., Trace], later: str) -> None:
+def test_ordinary_nodes_stay_in_virtual_time(run: Callable[..., AssessedTrace], later: str) -> None:
     trace = run("", later)
     assert trace.clock_reason == ""
     assert len(trace.messages("/cmd_vel")) >= 59
 
 
 @pytest.mark.nightly
-def test_a_slow_start_delays_nothing(run: Callable[..., Trace]) -> None:
+def test_a_slow_start_delays_nothing(run: Callable[..., AssessedTrace]) -> None:
     """What a node does before it first waits is no lateness."""
     assert run("end = os.times().user + 1.5\nwhile os.times().user < end: pass", "").clock_reason == ""

@@ -34,7 +34,7 @@ from grader.grading.model.wording import quote
 from grader.runtime.model.author_files import AuthorMistake, error_words, line_of
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import Fault, Trace, main_not_called, same_node_name
+from grader.runtime.model.trace import AssessedTrace, Fault, Trace, main_not_called, same_node_name
 
 #: Modules of rules; each rule says itself where it stands among all.
 _MODULES = (
@@ -64,7 +64,7 @@ CAUSE_KEY = "diagnosis"
 def cases_of(  # noqa: PLR0913  what was found, and everything that may explain it
     verdicts: tuple[Verdict, ...],
     exercise: Exercise,
-    traces: Mapping[str, Trace],
+    traces: Mapping[str, AssessedTrace],
     submission: Submission,
     sources: Mapping[str, str],
     facts: Mapping[str, object],
@@ -86,10 +86,11 @@ def cases_of(  # noqa: PLR0913  what was found, and everything that may explain 
     lost: dict[str, Criterion] = {}
     cases: list[Case | None] = []
     for verdict, criterion in zip(verdicts, exercise.criteria, strict=True):
-        trace = traces.get(criterion.scenario)
-        if verdict.outcome not in _LOST or trace is None or trace.harness_problem:
+        assessed = traces.get(criterion.scenario)
+        if verdict.outcome not in _LOST or assessed is None or assessed.harness_problem:
             cases.append(None)
             continue
+        trace = assessed.recorded
         scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
         own = {name: read_[name] for name in scenario.processes if name in read_}
         others = tuple(c for c in exercise.criteria if c is not criterion)

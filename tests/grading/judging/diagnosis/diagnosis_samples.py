@@ -31,7 +31,7 @@ from grader.grading.model.report import ExerciseReport, Verdict
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.loader import read_rubric
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import Delivery, FaultKind, LogRecord, Trace
+from grader.runtime.model.trace import AssessedTrace, Delivery, FaultKind, LogRecord
 
 HERE = Path(__file__).parent
 FLOAT64 = "std_msgs/msg/Float64"
@@ -77,7 +77,7 @@ def exercise_of(file: str) -> Exercise:
     return exercises()[rubric_of(file)]
 
 
-def report(file: str, traces: Mapping[str, Trace], texts: Mapping[str, str] | None) -> ExerciseReport:
+def report(file: str, traces: Mapping[str, AssessedTrace], texts: Mapping[str, str] | None) -> ExerciseReport:
     """Judge the exercise of a file, with the sources or, for None, without."""
     exercise = exercise_of(file)
     return judge_exercise(exercise, traces, submission_to(exercise), texts)

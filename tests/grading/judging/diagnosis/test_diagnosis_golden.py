@@ -34,7 +34,7 @@ from grader.grading.judging.judge_run import undiagnosed
 from grader.grading.model.exercise import Outcome
 from grader.grading.model.report import ExerciseReport, Verdict
 from grader.grading.rubrics.builtin import builtin_exercises
-from grader.runtime.model.trace import Start, StartWay, Trace
+from grader.runtime.model.trace import AssessedTrace, Start, StartWay
 
 HERE = Path(__file__).parent
 #: The rules of the grader, and of the exercises that come with it.
@@ -46,7 +46,7 @@ SLIPS = rows("slips.yaml")
 ENDED = [row for row in SLIPS if "fault" in row]
 
 
-def explained(row: Row, traces: Mapping[str, Trace]) -> ExerciseReport:
+def explained(row: Row, traces: Mapping[str, AssessedTrace]) -> ExerciseReport:
     return report(row["file"], traces, texts_of(row))
 
 
@@ -56,14 +56,14 @@ def texts_of(row: Row) -> dict[str, str]:
     return {**texts, row["file"]: spoilt(row["file"], row["change"])}
 
 
-def crash_traces(row: Row) -> dict[str, Trace]:
+def crash_traces(row: Row) -> dict[str, AssessedTrace]:
     scenarios = exercise_of(row["file"]).scenarios
     starts = (Start(row["file"], row["file"], StartWay.SCRIPT, hidden=tuple(row["fault"].get("hidden", ()))),)
     rec = crashed(row["file"], row["fault"])
     return {s.id: rec.trace(s.id, starts=starts) for s in scenarios if row["file"] in s.processes}
 
 
-def behaviour_traces(row: Row) -> dict[str, Trace]:
+def behaviour_traces(row: Row) -> dict[str, AssessedTrace]:
     ((name, arguments),) = row["recording"].items()
     scenario, build = RECORDINGS[name]
     if name.startswith("logging") and not arguments.get("printed"):
@@ -102,7 +102,7 @@ def test_wrong_behaviour_is_traced_to_its_cause(row: Row) -> None:
     assert said(row, found[row["criterion"]]) == (row["cause"], row["at"], row["hint"])
 
 
-def traces_of(row: Row) -> dict[str, Trace]:
+def traces_of(row: Row) -> dict[str, AssessedTrace]:
     """Return the recordings of a row of either table."""
     return crash_traces(row) if "fault" in row else behaviour_traces(row)
 
@@ -137,7 +137,7 @@ def test_a_cause_is_explained_once() -> None:
 
 
 def diagnosed(
-    row: Row, traces: Mapping[str, Trace], *, reasons: bool = True, more: tuple[Rule, ...] = ()
+    row: Row, traces: Mapping[str, AssessedTrace], *, reasons: bool = True, more: tuple[Rule, ...] = ()
 ) -> list[Verdict]:
     """Return the verdicts of a row as reports have them, looked for without any reason, or with more rules before."""
     exercise, texts = exercise_of(row["file"]), texts_of(row)

@@ -17,17 +17,17 @@ from grader.grading.judging.source import LONGEST_SOURCE, chain, last_line, read
 from grader.grading.submissions.sources import read_sources
 from grader.runtime.model.limits import MAX_SOURCE_BYTES
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, FaultKind
 
 FILE = "velocity_publisher.py"
 DEEP = 3_000
 
 
-def silent_trace() -> Trace:
+def silent_trace() -> AssessedTrace:
     return RECORDINGS["silent"][1]().trace("alone")
 
 
-def wrong_traces() -> list[Trace]:
+def wrong_traces() -> list[AssessedTrace]:
     """Recordings that bring as many causes as possible to look at the source."""
     recordings = [
         RECORDINGS["silent"][1](),

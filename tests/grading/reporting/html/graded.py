@@ -12,7 +12,7 @@ from grader.grading.model.exercise import Exercise
 from grader.grading.model.report import ExerciseReport, Report
 from grader.grading.rubrics.builtin import builtin_exercises
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import FaultKind, Trace
+from grader.runtime.model.trace import AssessedTrace, FaultKind
 
 CHAPTER = ("velocity_publisher", "odom_subscriber", "two_node_communication")
 SENSOR, CONTROLLER = "/temperature_sensor", "/fan_controller"
@@ -61,7 +61,7 @@ def _report(first: Recording, second: Recording, speed: str, name: str = "ada") 
     return report(*(_graded(exercise, traces) for exercise in rubrics), name=name)
 
 
-def _graded(exercise: Exercise, traces: Mapping[str, Trace]) -> ExerciseReport:
+def _graded(exercise: Exercise, traces: Mapping[str, AssessedTrace]) -> ExerciseReport:
     own = {s.id: traces[s.id] for s in exercise.scenarios}
     submission = Submission(
         "ada", "./ada", Path(), "sha256:" + "0" * 64, {f: StudentFile(f, f) for f in exercise.files}
