@@ -62,7 +62,7 @@ def test_a_parser_is_found_by_its_import_or_call(tmp_path: Path, code: str, kind
 
 #: The modules of the contained process that read a submission, which no other process imports.
 CONTAINED = (
-    *("submission_reader", "program_reader", "project_reader", "setup_files", "cmake_files"),
+    *("submission_reader", "program_reader", "project_reader", "setup_files", "cmake_files", "manifests"),
     *("reaching", "revealing"),
 )
 

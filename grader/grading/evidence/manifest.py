@@ -22,6 +22,7 @@ from grader.grading.model.report import Environment
 from grader.runtime.files import replace_file
 from grader.runtime.model.errors import EvidenceError
 from grader.runtime.model.packages import BroughtPackage
+from grader.runtime.model.projects import ExaminedPackage
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Definition, StudentFile
 from grader.runtime.stimuli import RecordedStream
@@ -123,6 +124,7 @@ class KeptSubmission(_Strict, frozen=True):
     digest: str
     files: tuple[StudentFile, ...]
     notes: tuple[str, ...]
+    packages: tuple[ExaminedPackage, ...] = ()
 
 
 class KeptRecording(_Strict, frozen=True):

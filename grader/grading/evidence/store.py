@@ -280,6 +280,7 @@ def _manifest(
             submission.digest,
             tuple(submission.files.values()),
             submission.notes,
+            submission.packages,
         ),
         run=kept.KeptRun(submission.path, run.seed, run.duration_s, run.notes, run.reproduce.recording, dict(request)),
         environment=run.environment,
@@ -312,4 +313,5 @@ def _submission(manifest: kept.Manifest) -> Submission:
         digest=submission.digest,
         files={file.wanted: file for file in submission.files},
         notes=submission.notes,
+        packages=submission.packages,
     )

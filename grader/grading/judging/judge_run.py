@@ -11,10 +11,20 @@ from grader.grading.judging.diagnosis import cases_of, clues_for, diagnose, plac
 from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, is_asked
 from grader.grading.judging.figures import excerpts_for, illustrated, on_recordings
 from grader.grading.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
+from grader.grading.judging.installs import notes_on_installing
 from grader.grading.judging.run_check import Answer, check_name, run_check
 from grader.grading.judging.simulations import unheard_by_simulations
 from grader.grading.judging.values import HIDDEN_TOPICS, on_student_topic
-from grader.grading.model.exercise import Criterion, Exercise, Finding, Outcome, roles_of, texts_under, variant_notes
+from grader.grading.model.exercise import (
+    Criterion,
+    Exercise,
+    Finding,
+    Outcome,
+    reads_packages,
+    roles_of,
+    texts_under,
+    variant_notes,
+)
 from grader.grading.model.report import (
     AUTHOR_MISTAKE,
     NOT_JUDGED,
@@ -54,6 +64,7 @@ def judge_run(
         pictures: Whether to draw figures, which takes about as long as judging and only some formats show.
         pending: Ids of the exercises that are not yet recorded; the report is then partial.
     """
+    asked = any(reads_packages(criterion.check) for exercise in exercises for criterion in exercise.criteria)
     return Report(
         name=run.submission.name,
         path=run.submission.path,
@@ -65,7 +76,7 @@ def judge_run(
             for exercise in exercises
         ),
         duration_s=run.duration_s,
-        notes=run.notes,
+        notes=(*run.notes, *(() if asked else notes_on_installing(run.submission.packages))),
         staff_notes=tuple(note for note in run.notes if note not in run.submission.notes),
         reproduce=run.reproduce,
         pending=tuple(exercise.id for exercise in exercises if exercise.id in pending),

@@ -14,7 +14,7 @@ from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_pack
 from grader.grading.judging.launched import excuses
 from grader.grading.judging.proportion import in_proportion, over_draws
 from grader.grading.judging.values import student_endpoints
-from grader.grading.model.exercise import Criterion, Exercise, Finding, ask, of_beginning, reads_sources
+from grader.grading.model.exercise import Criterion, Exercise, Finding, ask, of_beginning, reads_packages, reads_sources
 from grader.grading.model.wording import quote, span
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
@@ -87,7 +87,7 @@ def run_check(
     return Answer(finding=finding, recording=ids[place])
 
 
-def _run_once(
+def _run_once(  # noqa: PLR0911  one for each reason
     criterion: Criterion,
     exercise: Exercise,
     traces: Mapping[str, AssessedTrace],
@@ -101,6 +101,8 @@ def _run_once(
     missing = tuple(p for p in wanted if p in submission.files and submission.files[p].found is None)
     if missing:
         return Answer(missing=missing)
+    if reads_packages(criterion.check):
+        return Answer(finding=criterion.check.judge_packages(submission.packages))
     if trace is None or trace.author_mistake is not None or trace.harness_problem:
         return _unrecorded(scenario, trace)
     if scenario.test is not None:  # every program of its run counts, under whatever name it was started

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeGuard
 
 from grader.grading.model.measures import Measure, Measured, Reading, Scale, readings_of
 from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.projects import ExaminedPackage
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.trace import AssessedTrace, Trace
 from grader.runtime.stimuli import RecordedStream
@@ -342,6 +343,18 @@ class SourceCheck(Protocol):
 def reads_sources(check: object) -> TypeGuard[SourceCheck]:
     """Return whether a check also reads the students' files."""
     return has_member(check, "judge_sources")
+
+
+class PackageCheck(Protocol):
+    """A check of the ROS packages that were handed in, which asks nothing of a recording."""
+
+    def judge_packages(self, packages: tuple[ExaminedPackage, ...]) -> Finding:
+        """Judge the packages; a pure function."""
+
+
+def reads_packages(check: object) -> TypeGuard[PackageCheck]:
+    """Return whether a check judges the packages of a submission."""
+    return hasattr(type(check), "judge_packages")
 
 
 def ask(check: Check, trace: Trace, sources: Mapping[str, str] | None) -> Finding:

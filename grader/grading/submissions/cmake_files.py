@@ -45,6 +45,32 @@ _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _MAY_RUN = frozenset({"OWNER_EXECUTE", "GROUP_EXECUTE", "WORLD_EXECUTE"})
 #: What is between these commands runs as often as CMake decides.
 _BLOCKS = {"foreach": "endforeach", "while": "endwhile", "function": "endfunction", "macro": "endmacro"}
+#: Commands that install nothing but what is built of code and definitions.
+_HARMLESS = frozenset(
+    {
+        *(
+            "cmake_minimum_required",
+            "if",
+            "elseif",
+            "else",
+            "endif",
+            "option",
+            "message",
+            "return",
+            "add_compile_options",
+        ),
+        *("find_package", "find_library", "include_directories", "add_library", "set_target_properties"),
+        *(
+            "ament_package",
+            "ament_target_dependencies",
+            "ament_export_dependencies",
+            "ament_lint_auto_find_test_dependencies",
+        ),
+        *("rosidl_generate_interfaces", "rosidl_get_typesupport_target", "rosidl_target_interfaces", "enable_testing"),
+        *("add_definitions", "ament_add_gtest", "ament_add_pytest_test", "add_dependencies"),
+    }
+)
+_HARMLESS_BEGINNINGS = ("target_", "ament_export_")
 _KEYWORDS = frozenset(
     {
         *("DESTINATION", "RENAME", "COMPONENT", "TYPE", "PATTERN", "REGEX", "CONFIGURATIONS"),
@@ -79,6 +105,9 @@ class Contents:
         configurations: The setup.cfg files whose console scripts become programs, relative to the package.
         imported: The folders that hold installed Python packages, relative to the package.
         unread: Whether it may install programs that were not found.
+        project: The name that it gives the project; empty if that is not known.
+        missing: The files that it installs, whatever its conditions are, and that are not there.
+        no_launch: Whether it certainly installs no launch file.
     """
 
     installed: list[Installed] = field(default_factory=list)
@@ -86,6 +115,9 @@ class Contents:
     configurations: list[str] = field(default_factory=list)
     imported: list[str] = field(default_factory=list)
     unread: bool = False
+    project: str = ""
+    missing: list[str] = field(default_factory=list)
+    no_launch: bool = False
 
 
 Command = tuple[str, list[tuple[str, bool]]]
@@ -149,12 +181,17 @@ class _Reader:
         self._package = package
         self._names = names
         self._values = {**_FIXED, "PROJECT_NAME": package}
-        self.found = Contents()
+        self._conditions = 0
+        self.found = Contents(no_launch=True)
 
     def run(self, commands: Iterable[Command]) -> None:
         """Evaluate commands."""
         blocks: list[str] = []
         for name, raw in commands:
+            self._conditions += (name == "if") - (name == "endif")
+            # what is not understood may install anything, and so may a whole folder
+            known = name in _COMMANDS or name in _HARMLESS or name.startswith(_HARMLESS_BEGINNINGS)
+            self.found.no_launch &= known and not any("launch" in text or "GLOB" in text for text, _ in raw)
             if name in _BLOCKS:
                 blocks.append(_BLOCKS[name])
             elif blocks and name == blocks[-1]:
@@ -202,7 +239,8 @@ class _Reader:
 
     def name_project(self, arguments: list[str]) -> None:
         """Evaluate `project(NAME ...)`."""
-        self._values["PROJECT_NAME"] = "".join(arguments[:1])
+        self._values["PROJECT_NAME"] = name = "".join(arguments[:1])
+        self.found.project = "" if _UNKNOWN in name else name
 
     def change_list(self, arguments: list[str]) -> None:
         """Evaluate `list(APPEND NAME ...)`; another change makes the list unknown."""
@@ -251,6 +289,7 @@ class _Reader:
         if kind not in ("PROGRAMS", "FILES", "DIRECTORY"):
             return
         given = _by_keyword(arguments[1:])
+        self._look_for(kind, given)
         target = "".join(given.get("DESTINATION", ())[:1])
         if not self._is_for_programs(target):
             self.found.unread |= _UNKNOWN in target
@@ -268,6 +307,13 @@ class _Reader:
                 runs = runs if _MAY_RUN.isdisjoint(given.get("PERMISSIONS", ())) else "yes"
                 name = "".join(given.get("RENAME", ())[:1]) or posixpath.basename(path)
                 self.found.installed.append(Installed(name, path, runs))
+
+    def _look_for(self, kind: str, given: Mapping[str, Sequence[str]]) -> None:
+        """Note the files of an install() that are not there, and a folder that holds everything."""
+        paths = [_path(text) for text in given[""]]
+        self.found.no_launch &= None not in paths and "" not in paths
+        if kind != "DIRECTORY" and not self._conditions and "OPTIONAL" not in given:
+            self.found.missing += [path for path in paths if path and path not in self._names]
 
     def _is_for_programs(self, target: str) -> bool:
         """Return whether `ros2 run` looks for programs of the package in an installed folder."""

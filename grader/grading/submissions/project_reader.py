@@ -2,8 +2,10 @@
 
 Of each package it tells `name` (null if none is given), `scripts`, `data_files` (null if not known), `programs` that
 are installed as they are, each with its file and whether it is made executable, names of programs that CMake builds as
-`built`, `imported` folders, `unread`, whether there may be other programs, and `problems`, pairs of a file and one of
-`PROBLEMS`.
+`built`, `imported` folders, `unread`, whether there may be other programs, `problems`, pairs of a file and one of
+`PROBLEMS`, and, for what a build leaves out, `manifest`, as `manifests` says it, `setup`, what is passed to setup() as
+far as all of it is known, `script_folders` of setup.cfg for `install` and `develop`, and of CMakeLists.txt
+`cmake_name`, `missing` files, and `no_launch`, whether it certainly installs no launch file.
 
 No code of a student is imported or run: setup.py is only parsed.
 """
@@ -20,6 +22,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from grader.grading.submissions.cmake_files import Contents, contents_of
+from grader.grading.submissions.manifests import manifest_description
 from grader.grading.submissions.setup_files import LimitError, given_to_setup
 
 #: Why a file was not read: it is not valid in its format, or reading it would take too much.
@@ -61,7 +64,7 @@ def project_description(files: dict[str, bytes], names: Sequence[str]) -> dict[s
 
     nothing: dict[str, Any] = {}
     none: list[str] = []
-    given = read("setup.py", lambda content: given_to_setup(ast.parse(content), names), nothing)
+    given, sure = read("setup.py", lambda content: given_to_setup(ast.parse(content), names), (nothing, False))
     lines = [
         *_scripts_of_setup(given),
         *read("pyproject.toml", _scripts_of_pyproject, none),
@@ -86,7 +89,41 @@ def project_description(files: dict[str, bytes], names: Sequence[str]) -> dict[s
         "imported": by_cmake.imported,
         "unread": by_cmake.unread,
         "problems": problems,
+        "manifest": read("package.xml", manifest_description, None),
+        "setup": _setup(given, files.get("setup.cfg", b"")) if given and sure else None,
+        "script_folders": read("setup.cfg", _script_folders, None),
+        "cmake_name": by_cmake.project,
+        "missing": by_cmake.missing,
+        "no_launch": by_cmake.no_launch,
     }
+
+
+def _setup(given: dict[str, Any], configuration: bytes) -> dict[str, Any] | None:
+    """Return name, Python packages and their folders, of what is passed to setup(); what is not known is null."""
+    name, packages, folders = given.get("name"), given.get("packages"), given.get("package_dir", {})
+    if "cmdclass" in given or "options" in given:  # these may do anything
+        return None
+    known = isinstance(packages, list) and all(isinstance(one, str) for one in packages)
+    placed = isinstance(folders, dict) and all(isinstance(one, str) for one in folders.values())
+    return {
+        "name": name if isinstance(name, str) else "",
+        "packages": packages if known and placed else None,
+        "folders": list(folders.items()) if placed else [],
+        "installs_files": "data_files" in given or b"data_files" in configuration,
+    }
+
+
+def _script_folders(content: bytes) -> list[str]:
+    """Return where setup.cfg has scripts installed by `install` and by `develop`; setuptools takes - for _."""
+    parser = configparser.ConfigParser(interpolation=None)
+    parser.read_string(content.decode())
+    return [
+        next((text for name in names if (text := parser.get(section, name, fallback=""))), "")
+        for section, names in (
+            ("install", ("install_scripts", "install-scripts")),
+            ("develop", ("script_dir", "script-dir")),
+        )
+    ]
 
 
 def _name_in_manifest(content: bytes) -> str | None:

@@ -20,7 +20,7 @@ from grader.grading.submissions.contained_reader import (
     told_by_process,
 )
 from grader.runtime.model.limits import MAX_FILES, MAX_NAME_BYTES, MAX_PATH_BYTES
-from grader.runtime.model.projects import Project
+from grader.runtime.model.projects import PackageBuild, PackageManifest, Project, SetupCall
 from grader.runtime.model.wording import first_of
 from grader.runtime.programs.executables import CMAKE_LISTS, files_below, project_folders
 
@@ -90,7 +90,7 @@ class Packages:
         for folder in self.folders[:MOST_PACKAGES]:
             contents = {name: self._added(folder / name, asked) for name in FILES}
             cmake, setup = contents[CMAKE_LISTS], contents["setup.py"]
-            lists = bool(cmake) or b"glob" in setup
+            lists = bool(cmake) or b"glob" in setup or b"find_" in setup
             below = [*islice(files_below(folder), MAX_FILES)] if lists else []
             place = _relative(folder, self._root)
             names |= dict.fromkeys(posixpath.join(place, name) for name in below)
@@ -191,7 +191,56 @@ def _with_programs(project: Project, answer: Mapping[str, Any], folder: Path) ->
         imported=tuple(dict.fromkeys(path for path in imported if path != "."))[:MOST_SCRIPTS],
         unread=answer.get("unread", (folder / CMAKE_LISTS).is_file()) is True,
         by_cmake=(folder / CMAKE_LISTS).is_file(),
+        build=_build(answer),
     )
+
+
+#: The most characters of a name or a problem in what is told of a build.
+_TOLD_CHARACTERS = 200
+
+
+def _build(answer: Mapping[str, Any]) -> PackageBuild:
+    """Return what the process reported on the build of a package, each part checked."""
+    folders = _strings(answer.get("script_folders"))
+    return PackageBuild(
+        manifest=_manifest(answer.get("manifest")),
+        setup=_setup_call(answer.get("setup")),
+        script_folders=(_short(folders[0]), _short(folders[1])) if len(folders) == 2 else None,
+        cmake_name=next(iter(_strings([answer.get("cmake_name")])), "")[:_TOLD_CHARACTERS],
+        missing=tuple(path for text in _strings(answer.get("missing")) if (path := _normal(text))),
+        no_launch=answer.get("no_launch") is True,
+    )
+
+
+def _manifest(told: Any) -> PackageManifest | None:
+    if not isinstance(told, dict):
+        return None
+    problem = _strings(told.get("problem"))
+    names = [
+        [name for name in _strings(told.get(key)) if _NAME.fullmatch(name)] for key in ("dependencies", "build_types")
+    ]
+    code = (_short(problem[0]), _short(problem[1])) if len(problem) == 2 else None
+    return PackageManifest(code, tuple(names[0]), tuple(names[1]))
+
+
+def _setup_call(told: Any) -> SetupCall | None:
+    if not isinstance(told, dict):
+        return None
+    name, packages = told.get("name"), told.get("packages")
+    known = [one for one in _strings(packages) if _MODULE.fullmatch(one) and _is_path(one)]
+    folders = [pair for pair in _pairs(told.get("folders")) if all(isinstance(part, str) for part in pair)]
+    placed = [(of, _normal(folder or ".")) for of, folder in folders if _is_path(of or "x")]
+    whole = isinstance(packages, list) and len(known) == len(packages) and all(folder for _, folder in placed)
+    return SetupCall(
+        _short(name) if isinstance(name, str) else "",
+        tuple(known) if whole and len(placed) == len(folders) else None,
+        tuple(placed),
+        told.get("installs_files") is not False,
+    )
+
+
+def _short(text: str) -> str:
+    return text[:_TOLD_CHARACTERS].encode("utf-8", "replace").decode()
 
 
 def _strings(value: Any) -> list[str]:

@@ -25,8 +25,10 @@ class LimitError(ValueError):
     """Reading the file would take too much."""
 
 
-def given_to_setup(tree: ast.Module, names: Sequence[str]) -> dict[str, Any]:
-    """Return the keyword arguments of setup(), as far as they can be evaluated; unknown values are None.
+def given_to_setup(tree: ast.Module, names: Sequence[str]) -> tuple[dict[str, Any], bool]:
+    """Return the keyword arguments of setup(), unknown values as None, and whether what is known of each is all of it.
+
+    A loop over values that are not known, for instance, may add to anything.
 
     Args:
         tree: The parsed file.
@@ -37,7 +39,7 @@ def given_to_setup(tree: ast.Module, names: Sequence[str]) -> dict[str, Any]:
     """
     reader = _Reader(names)
     reader.run(tree.body)
-    return reader.given
+    return reader.given, reader.sure
 
 
 class _Reader:
@@ -46,6 +48,7 @@ class _Reader:
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names
         self.given: dict[str, Any] = {}
+        self.sure = True
         self._known: dict[str, Any] = {}
         self._steps = 0
 
@@ -65,7 +68,7 @@ class _Reader:
             elif isinstance(statement, (ast.Expr, ast.Return)):
                 self._value(statement.value)
             elif isinstance(statement, ast.For):
-                for item in _items(self._value(statement.iter)):
+                for item in self._iterated(statement.iter):
                     self._bind(statement.target, item)
                     self.run(statement.body)
             else:
@@ -127,8 +130,14 @@ class _Reader:
             value = self._called(node)
         return value
 
+    def _iterated(self, node: ast.expr) -> list[Any]:
+        """Return the items of an expression; with an unknown one, not all is known that they are put into."""
+        value = self._value(node)
+        self.sure = self.sure and value is not None
+        return _items(value)
+
     def _elements(self, node: ast.expr) -> list[Any]:
-        return _items(self._value(node.value)) if isinstance(node, ast.Starred) else [self._value(node)]
+        return self._iterated(node.value) if isinstance(node, ast.Starred) else [self._value(node)]
 
     def _dictionary(self, pairs: Iterable[tuple[ast.expr | None, ast.expr]]) -> dict[str, Any]:
         found: dict[str, Any] = {}
@@ -138,6 +147,8 @@ class _Reader:
                 found[name] = value
             elif key is None and isinstance(value, dict):
                 found.update(value)
+            else:
+                self.sure = False
         return found
 
     def _comprehended(self, element: ast.expr, generators: list[ast.comprehension]) -> Iterator[Any]:
@@ -145,11 +156,11 @@ class _Reader:
         if not generators:
             yield self._value(element)
             return
-        for item in _items(self._value(generators[0].iter)):
+        for item in self._iterated(generators[0].iter):
             self._bind(generators[0].target, item)
             yield from self._comprehended(element, generators[1:])
 
-    def _called(self, node: ast.Call) -> Any:
+    def _called(self, node: ast.Call) -> Any:  # noqa: PLR0911  one for each kind of call
         named = self._dictionary((None if k.arg is None else ast.Constant(k.arg), k.value) for k in node.keywords)
         if _name(node.func) == "setup":
             self.given = self.given or named
@@ -157,14 +168,41 @@ class _Reader:
         values = [item for argument in node.args for item in self._elements(argument)]
         if _name(node.func) in ("glob", "iglob") and values and isinstance(values[0], str):
             return self._matching(values[0])
+        if _name(node.func) in ("find_packages", "find_namespace_packages"):
+            return self._packages(values, named, plain=_name(node.func) == "find_packages")
         if isinstance(node.func, ast.Attribute) and _dotted(node.func) in ("path.join", "os.path.join"):
             return posixpath.join(*values) if values and all(isinstance(value, str) for value in values) else None
         if isinstance(node.func, ast.Attribute):
+            self.sure = self.sure and not (node.func.attr == "extend" and None in values)
             return _method(self._value(node.func.value), node.func.attr, values, named)
         name = _name(node.func)
         if name == "dict":
             return {**(values[0] if values and isinstance(values[0], dict) else {}), **named}
         return _made(name, values[0]) if len(values) == 1 else None
+
+    def _packages(self, values: list[Any], named: dict[str, Any], *, plain: bool) -> list[str] | None:
+        """Evaluate find_packages(where, exclude, include): the folders with an __init__.py, dotted.
+
+        Without `plain`, all folders with a module count.
+        """
+        given = {**dict(zip(("where", "exclude", "include"), values, strict=False)), **named}
+        where, exclude, include = given.get("where", "."), given.get("exclude", []), given.get("include", ["*"])
+        texts = [where, *_items(exclude), *_items(include)]
+        if None in (where, exclude, include) or not all(isinstance(text, str) for text in texts):
+            return None
+        begin = posixpath.normpath(where)
+        above = "" if begin == "." else f"{begin}/"
+        below = [name.removeprefix(above) for name in self._names if name.startswith(above)]
+        folders = {posixpath.dirname(name) for name in below if name.endswith(".py")} - {""}
+        if plain:
+            marked = {name.removesuffix("/__init__.py") for name in below if name.endswith("/__init__.py")}
+            folders = {f for f in marked if all(up in marked for up in _with_parents(f))}
+        dotted = [folder.replace("/", ".") for folder in sorted(folders) if "." not in folder]
+        return [
+            name
+            for name in dotted
+            if any(fnmatchcase(name, one) for one in include) and not any(fnmatchcase(name, one) for one in exclude)
+        ]
 
     def _matching(self, pattern: str) -> list[str] | None:
         """Return the files below the folder that match a pattern; None for a pattern that could match others."""
@@ -172,6 +210,13 @@ class _Reader:
         if pattern.startswith("/") or ".." in parts or "**" in parts:
             return None
         return sorted(name for name in self._names if _matches(name.split("/"), parts))
+
+
+def _with_parents(folder: str) -> Iterator[str]:
+    """Yield a relative folder and those that it is in."""
+    while folder:
+        yield folder
+        folder = posixpath.dirname(folder)
 
 
 def _matches(path: Sequence[str], pattern: Sequence[str]) -> bool:

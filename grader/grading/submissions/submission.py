@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.contents import SubmissionContents, read_contents
+from grader.grading.submissions.installing import examined_packages
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.staging import collect_folder, read_start, write_files
 from grader.runtime.model.errors import SubmissionError
@@ -126,6 +127,7 @@ def stage_collected(
         files=files,
         notes=(*several, *_unrunnable(files.values(), projects), *collected.notes, *contents.notes),
         projects=_meant_first(projects, files.values()),
+        packages=examined_packages(projects, (name for name, _ in collected.files), contents.programs),
         programs=contents.programs,
     )
 

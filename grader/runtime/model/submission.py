@@ -7,7 +7,7 @@ from dataclasses import field
 from pathlib import Path
 
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.projects import Project
+from grader.runtime.model.projects import ExaminedPackage, Project
 
 
 class SourceText(str):
@@ -98,6 +98,7 @@ class Submission:
     files: Mapping[str, StudentFile] = field(default_factory=dict)  # wanted file name -> the file that was found for it
     notes: tuple[str, ...] = ()  # sentences about the files that readers must know
     projects: tuple[Project, ...] = ()  # its ROS packages, outermost first
+    packages: tuple[ExaminedPackage, ...] = ()  # the same, with what their build refuses or leaves out
     programs: Mapping[str, ReadProgram] = field(default_factory=dict)  # path inside the submission -> its Python file
 
 

@@ -8,6 +8,7 @@ from grader.grading.judging.checks.goal_clients import AfterGoal, CancelsGoal, S
 from grader.grading.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
 from grader.grading.judging.checks.heard import LogsResponse, LogsTexts
 from grader.grading.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
+from grader.grading.judging.checks.packages import Installs
 from grader.grading.judging.checks.programs import (
     CleanShutdown,
     NoFault,
@@ -72,5 +73,6 @@ CHECKS: dict[str, type] = {
     "stays_in_range": StaysInRange,
     "source_uses": SourceUses,
     "source_avoids": SourceAvoids,
+    "installs": Installs,
 }
 __all__ = ["CHECKS"]

@@ -71,5 +71,6 @@ INSTANCES: dict[str, Check] = {
     "reaches_goal": CHECKS["reaches_goal"]("/odom", "/goal", {"pose.pose.position.x": "x"}, 0.1, 5 * NS_PER_S),
     "stays_in_range": CHECKS["stays_in_range"]("/temperature", field="data", low=0.0, high=40.0),
     "source_uses": CHECKS["source_uses"]("velocity_publisher.py", ("rclpy.node.Node",)),
+    "installs": CHECKS["installs"](),
     "source_avoids": CHECKS["source_avoids"]("velocity_publisher.py", ("time.sleep",)),
 }

@@ -33,10 +33,11 @@ from wordings import WRONG as WRONG_POSITIONS
 
 from grader.grading.judging.charts import MOST_CASES
 from grader.grading.judging.plots import chart_of
-from grader.grading.model.exercise import Check, ask
+from grader.grading.model.exercise import Check, ask, reads_packages
 from grader.grading.reporting.html.render import Columns, figure_values
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.projects import ExaminedPackage, FlawKind, InstallFlaw
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import (
     ClockKind,
@@ -146,7 +147,16 @@ OBSERVATIONS = st.one_of(
 SOURCES = {"fan_controller.py": "import rclpy\n", "velocity_publisher.py": "import rclpy\nrclpy.spin_once(None)\n"}
 
 
+#: For checks that read the packages.
+PACKAGES = (
+    ExaminedPackage("own", "", (InstallFlaw(FlawKind.NO_SETUP, "package.xml", 3, ("setup.py\n", "\ud800")),)),
+    ExaminedPackage("other", "other"),
+)
+
+
 def asked(check: Check, trace: Trace) -> Any:
+    if reads_packages(check):
+        return check.judge_packages(PACKAGES)
     try:
         return ask(check, trace, SOURCES)
     except HarnessError as error:
