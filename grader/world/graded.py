@@ -31,7 +31,7 @@ from grader.runtime.session import TestJob, WorkerLostError
 from grader.runtime.steps import LaunchFailedError
 from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
-from grader.world.programs import Found, Runnable
+from grader.world.programs import NAMED_SO, Found, Runnable
 from grader.world.world import World
 
 #: What `@pytest.mark.ros` takes in a rubric.
@@ -153,7 +153,7 @@ class GradedWorld(World):
         own = dict(self._provided)
         found = Found(name, Path(self._job.plan.root), name) if name in own else self._found(name)
         if not is_launch_file(name):
-            raise SubmissionError(f"{name}: expected a launch file", "its name ends with launch.py")
+            raise SubmissionError(f"{name}: expected a launch file", NAMED_SO)
         return found, self._job.known
 
     def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Any:

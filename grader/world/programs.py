@@ -15,8 +15,9 @@ from grader.grading.submissions.submission import read_projects
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.projects import Project
-from grader.runtime.model.scenario import is_launch_file
+from grader.runtime.model.scenario import LAUNCH_ENDINGS, is_launch_file
 from grader.runtime.model.trace import Fault, LogRecord, OutputLine
+from grader.runtime.model.wording import listed
 from grader.runtime.programs.executables import (
     IGNORED,
     Executable,
@@ -141,6 +142,10 @@ def _projects(root: Path) -> tuple[Project, ...]:
     return tuple(read_projects(root)[0])
 
 
+#: How launch files are named.
+NAMED_SO = f"its name ends with {listed(LAUNCH_ENDINGS)}"
+
+
 def find_launch_file(wanted: str | os.PathLike[str], near: Sequence[Path]) -> tuple[Found, tuple[tuple[str, str], ...]]:
     """Find a launch file, and return it with the name of each program that it may start, by the program's file.
 
@@ -148,10 +153,7 @@ def find_launch_file(wanted: str | os.PathLike[str], near: Sequence[Path]) -> tu
     """
     found = find_program(wanted, near)
     if not is_launch_file(found.name):
-        raise SubmissionError(
-            f"{found.name}: expected a launch file",
-            "only those in Python are understood, whose names end with launch.py",
-        )
+        raise SubmissionError(f"{found.name}: expected a launch file", NAMED_SO)
     known = [(f"{one.file} {one.name}" if one.target else one.file, one.words) for one in _runnable(found)]
     loose = () if found.projects else ((path.name, path.name) for path in sorted(found.root.glob("*.py")))
     return found, (*((file, name) for file, name in known if file), *loose)

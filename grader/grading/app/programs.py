@@ -15,6 +15,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.limits import MAX_FILES, MAX_TOTAL_BYTES
 from grader.runtime.model.projects import Project
+from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.wording import first_of, listed
 from grader.runtime.programs.executables import (
@@ -33,8 +34,6 @@ from grader.runtime.programs.executables import (
 
 #: What can be named.
 _WHAT = "name .py files, launch files, packages, workspaces, FOLDER/EXECUTABLE or FOLDER/PACKAGE/EXECUTABLE"
-#: What launch files that are not in Python are written in, by the ending of their names.
-_LAUNCH_LANGUAGES = {".xml": "XML", ".launch": "XML", ".yaml": "YAML", ".yml": "YAML"}
 #: The most executables that a message lists.
 _SHOWN = 12
 #: The most programs that are observed together: each is a process with a sandbox, 70 MB and a DDS participant.
@@ -93,11 +92,8 @@ def _with_folders(targets: list[Target]) -> tuple[Target, ...]:
 
 
 def _of_path(path: Path) -> Targets:
-    if path.is_file() and path.suffix == ".py":
+    if path.is_file() and (path.suffix == ".py" or is_launch_file(path.name)):
         return Targets((Target(path.name, path.resolve().parent, path),))
-    if path.is_file() and path.suffix in _LAUNCH_LANGUAGES and "launch" in path.name:
-        text = f"{path}: expected a launch file in Python, found one in {_LAUNCH_LANGUAGES[path.suffix]}"
-        raise SubmissionError(text, "only launch files in Python are understood: name the files of its nodes")
     if path.is_dir():
         return _of_folder(path)
     if not path.exists():

@@ -257,7 +257,7 @@ def _graph(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphSnapshot | N
 
 def _runs_all(scenario: Scenario, exercise: Exercise) -> bool:
     """Return whether every program of an exercise runs in a scenario, as far as a launch file does not decide it."""
-    programs = {name for name in exercise.files if not name.endswith((".yaml", ".yml"))}
+    programs = {n for n in exercise.files if is_launch_file(n) or not n.endswith((".yaml", ".yml"))}
     return programs == set(scenario.processes) or any(map(is_launch_file, scenario.processes))
 
 

@@ -163,7 +163,8 @@ def _in_connections(
 
 
 def _is_yaml(name: str) -> bool:
-    return name.endswith((".yaml", ".yml"))
+    """Return whether a file is one of parameters, by its name."""
+    return name.endswith((".yaml", ".yml")) and not is_launch_file(name)
 
 
 def _in_run(process: str, options: RunShape, rubric: RubricShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
@@ -357,6 +358,8 @@ def _provided(file: OwnFile) -> str:
     where = printable(str(file.path), 500)
     try:
         text = file.content.decode()
+        if is_launch_file(file.name) and not file.name.endswith(".py"):
+            return text  # it is read with the nodes that it starts
         if not _is_yaml(file.name):
             ast.parse(text)
             return text

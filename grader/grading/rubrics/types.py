@@ -181,7 +181,7 @@ PythonFile = Annotated[
 ProgramName = Annotated[
     str,
     MatchingText(
-        r"[^/\\\x00-\x1f]+\.py|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
+        r"[^/\\\x00-\x1f]+(?:\.py|launch\.(?:xml|ya?ml))|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
         "a file name such as my_node.py, without folders, or an executable such as my_package/talker",
         "my_node.py",
     ),
@@ -190,13 +190,13 @@ ProgramName = Annotated[
 HandedIn = Annotated[
     str,
     MatchingText(
-        r"[^/\\\x00-\x1f]+\.(?:py|ya?ml)|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
+        r"[^/\\\x00-\x1f]+(?:\.(?:py|ya?ml)|launch\.xml)|(?:\*|[A-Za-z][A-Za-z0-9_-]*)/[A-Za-z0-9_-][A-Za-z0-9_.-]*",
         "a file name such as my_node.py, without folders, or an executable such as my_package/talker",
         "my_node.py",
     ),
 ]
 #: A launch file or parameter file of the rubric's own, beside it.
-PROVIDED_FILE = r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:[._]launch\.py|\.ya?ml)"
+PROVIDED_FILE = r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:[._]launch\.(?:py|xml)|\.ya?ml)"
 PROVIDED_WORDS = "a launch file such as robot.launch.py or a YAML file, beside the rubric"
 ProvidedFile = Annotated[str, MatchingText(PROVIDED_FILE, PROVIDED_WORDS, "robot.launch.py")]
 #: A check file must be beside the rubric or below, and not hidden.

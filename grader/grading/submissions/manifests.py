@@ -49,9 +49,9 @@ def _root(content: bytes) -> tuple[ET.Element | None, list[str]]:
     """Return the root of a manifest, or why there is none."""
     builder = ET.TreeBuilder()
     parser = expat.ParserCreate()
-    parser.StartElementHandler = builder.start  # type: ignore[assignment]
-    parser.EndElementHandler = builder.end  # type: ignore[assignment]
-    parser.CharacterDataHandler = builder.data  # type: ignore[assignment]
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
     parser.EntityDeclHandler = _refuse
     try:
         parser.Parse(content, True)  # noqa: FBT003 - takes no keyword

@@ -22,6 +22,7 @@ from grader.grading.submissions.answers import (
 )
 from grader.grading.submissions.contained_reader import Asked, ReaderAnswer, Tell, read_within, told_by_process
 from grader.runtime.model.limits import MAX_PROGRAM_BYTES, MAX_SOURCE_BYTES
+from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.submission import Beginning, CompileError, ReadProgram, SourceText, Submission
 from grader.runtime.model.wording import first_of
 
@@ -79,7 +80,10 @@ class Programs:
     def told(self, answer: ReaderAnswer) -> tuple[dict[str, ReadProgram], tuple[str, ...]]:
         """Return the programs by path as the process says what they hold, and notes on those that it does not."""
         found, problems = dict(self._found), dict(self._problems)
-        for path, program, problem in _programs(answer, self._asked):
+        for path, read, problem in _programs(answer, self._asked):
+            in_python = path.endswith(".py") or not is_launch_file(path)
+            # Only its text is of use: it was read as Python.
+            program = read if in_python else ReadProgram(read.text, told=read.told)
             found[path] = program
             if problem:
                 problems[problem, path] = None

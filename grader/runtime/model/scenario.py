@@ -296,6 +296,10 @@ class Scenario:
         return tuple(dict.fromkeys(name for name in used if name not in own))
 
 
+#: How the names of launch files end: those in Python, XML and YAML.
+LAUNCH_ENDINGS = ("launch.py", "launch.xml", "launch.yaml", "launch.yml")
+
+
 def is_launch_file(name: str) -> bool:
-    """Return whether a file is a launch file, by its name: `ros2 launch` takes all that end in `launch.py`."""
-    return name.endswith("launch.py")
+    """Return whether a file is a launch file, by its name, as `ros2 launch` lists them."""
+    return name.endswith(LAUNCH_ENDINGS)

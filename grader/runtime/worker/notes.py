@@ -83,7 +83,7 @@ _LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
 }
 #: Why something is left out that would be understood otherwise, by its code.
 _WHY = {
-    "launch_file": "it is not in Python",
+    "launch_file": "its ending is not that of a launch file",
     "module": "this package is not installed",
     "nodes": "no more are started",
     "package": "the submission has no such package",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..protocol import LaunchedNode, NotEvaluated
@@ -44,6 +44,8 @@ class Context:
         self.parameter_files: list[str] = []
         self.files: list[str] = []
         self.delay_s = 0.0
+        #: Reads a launch file that is not in Python, by its path.
+        self.read_markup: Callable[[str, Context], Any] | None = None
         self.nodes: list[LaunchedNode] = []
         self.left_out: list[NotEvaluated] = []
 

@@ -12,6 +12,7 @@ from .context import Context, begin_evaluation
 from .entities import walk
 from .files import description_in
 from .left_out import LeftOutError, left_out_by
+from .markup import description_of
 from .modules import install
 from .places import folders_with_places, place_files_in, place_in
 from .shares import Shares
@@ -44,6 +45,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
     place_files_in(folders)
     shares = Shares(packages, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), prefix)
     context = Context(packages, shares, arguments, most_nodes, most_left_out)
+    context.read_markup = description_of
     begin_evaluation(context)
     install(context)
     setattr(os, "system", _without_shell(context))  # noqa: B010  a plain assignment would need its exact type

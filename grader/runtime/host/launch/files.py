@@ -12,6 +12,8 @@ from .entities import Action, LaunchDescription, walk
 from .left_out import LeftOutError
 from .unknown import pairs_of
 
+#: Endings of launch files that are not in Python.
+MARKUP = (".xml", ".yaml", ".yml", ".launch")
 #: The deepest nesting of included launch files.
 DEEPEST = 20
 
@@ -49,7 +51,7 @@ class IncludeLaunchDescription(Action):
         if isinstance(self.source, LaunchDescription):
             return self.source.entities
         path = context.shares.found(text_of(getattr(self.source, "path", self.source), context))
-        if not path.endswith(".py"):
+        if not path.endswith((".py", *MARKUP)):
             raise LeftOutError("launch_file", os.path.basename(path))
         if len(context.files) >= DEEPEST:
             raise RecursionError(f"launch files include each other more than {DEEPEST} times")
@@ -60,7 +62,10 @@ class IncludeLaunchDescription(Action):
 
 
 def description_in(path: str, context: Context) -> LaunchDescription:
-    """Run a launch file and return what its `generate_launch_description` returns."""
+    """Return what a launch file describes: in Python, what its `generate_launch_description` returns."""
+    if path.endswith(MARKUP) and context.read_markup is not None:
+        found: LaunchDescription = context.read_markup(path, context)
+        return found
     with open(path, "rb") as source:
         # In a share folder lies a copy: the places are those in the submission.
         code = compile(source.read(), context.shares.source_of(path), "exec", dont_inherit=True)
