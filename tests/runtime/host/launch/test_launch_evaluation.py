@@ -181,7 +181,7 @@ LEFT_OUT = {
     "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": 'the substitution Command("xacro a.urdf")',
     "SetEnvironmentVariable('PATH', '/x')": "the environment variable PATH",
     "Node(**TALKER, prefix='gdb')": "prefix= of a node",
-    "IncludeLaunchDescription('more.launch.xml')": "the launch file more.launch.xml",
+    "IncludeLaunchDescription('more.launch.toml')": "the launch file more.launch.toml",
     "LogInfo(msg=FindPackageShare('gazebo_ros'))": "what needs the package gazebo_ros",
     "LogInfo(msg=Node(**TALKER).node_name)": "what needs Node.node_name",
     "EmitEvent(event=ChangeState(lifecycle_node_matcher=launch.events.matches_action(Node(**TALKER)), "
