@@ -62,6 +62,8 @@ class PlannedStart:
         provided: Name and text of files that the launch file may need.
         known: Name of each handed-in file by its path in the submission, and by its path and executable.
         launched_by: The launch file that the process comes from, with its line.
+        given_parameters: The names of parameters that the launch file gives the node by name.
+        given_remappings: Old and new names that it gives the node.
     """
 
     process: str
@@ -73,6 +75,8 @@ class PlannedStart:
     provided: tuple[tuple[str, str], ...] = ()
     known: tuple[tuple[str, str], ...] = ()
     launched_by: str = ""
+    given_parameters: tuple[str, ...] = ()
+    given_remappings: tuple[tuple[str, str], ...] = ()
 
     @property
     def words(self) -> str:

@@ -151,12 +151,57 @@ def find_launch_file(wanted: str | os.PathLike[str], near: Sequence[Path]) -> tu
 
     Raises SubmissionError if there is none.
     """
-    found = find_program(wanted, near)
+    text = os.fspath(wanted)
+    package, slash, name = text.partition("/")
+    is_file = any((folder / text).is_file() for folder in near)
+    if slash and "/" not in name and not is_file and is_launch_file(name):
+        found = _launch_file_of(package, name, near)
+    else:
+        found = _in_workspace(find_program(wanted, near), near)
     if not is_launch_file(found.name):
         raise SubmissionError(f"{found.name}: expected a launch file", NAMED_SO)
     known = [(f"{one.file} {one.name}" if one.target else one.file, one.words) for one in _runnable(found)]
     loose = () if found.projects else ((path.name, path.name) for path in sorted(found.root.glob("*.py")))
     return found, (*((file, name) for file, name in known if file), *loose)
+
+
+def _launch_file_of(package: str, name: str, near: Sequence[Path]) -> Found:
+    """Return the launch file of a package that has a name, in any of its folders, as `ros2 launch` finds it."""
+    packages: set[str] = set()
+    for root, projects in dict.fromkeys((*map(_surroundings, near), *map(_below, near))):
+        packages |= {project.name for project in projects}
+        for project in (one for one in projects if one.name == package):
+            files = sorted(
+                (root / project.folder).rglob("*launch.py"), key=lambda path: (path.parent.name != "launch", path)
+            )
+            installed = {file for _, group in project.data_files or () for file in group}
+            for path in (one for one in files if one.name == name):
+                if (
+                    project.data_files is not None
+                    and path.relative_to(root / project.folder).as_posix() not in installed
+                ):
+                    text = f"{package}/{name}: expected a file that the package installs, found none in setup.py"
+                    raise SubmissionError(text, "add it to data_files, as `ros2 launch` needs it too")
+                return Found(name, root, path.relative_to(root).as_posix(), projects=projects)
+            close = nearest(name, [path.name for path in files])
+            hint = f"did you mean {package}/{close}?" if close else f"it has {first_few([path.name for path in files])}"
+            raise SubmissionError(
+                f"{package}/{name}: expected a launch file of a package, found none", hint if files else ""
+            )
+    close = nearest(package, packages)
+    hint = f"did you mean {close}/{name}?" if close else f"there are {first_few(sorted(packages))}" if packages else ""
+    raise SubmissionError(f"{package}/{name}: expected a package near the test, found none", hint)
+
+
+def _in_workspace(found: Found, near: Sequence[Path]) -> Found:
+    """Return a launch file that lies in no package with the packages of a workspace around it, if there is one."""
+    path = (found.root / found.file).resolve()
+    if found.projects:
+        return found
+    for root, projects in (_below(path.parent), *map(_surroundings, near), *map(_below, near)):
+        if projects and path.is_relative_to(root):
+            return Found(found.name, root, path.relative_to(root).as_posix(), projects=projects)
+    return found
 
 
 def _runnable(found: Found) -> list[Executable]:

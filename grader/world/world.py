@@ -336,7 +336,7 @@ class World:
         """Start the nodes that a launch file describes.
 
         Args:
-            file: The launch file, looked for like a program.
+            file: The launch file, looked for like a program, or `PACKAGE/FILE` as for `ros2 launch PACKAGE FILE`.
             arguments: Values of its arguments.
 
         Raises:
@@ -347,8 +347,12 @@ class World:
         found, known = self._found_launch_file(file)
         given = tuple((name, str(value)) for name, value in (arguments or {}).items())
         start = PlannedStart(found.name, launch_arguments=given, known=known, provided=self._provided)
+        before = {*self._graph.nodes}
         told = self._perform(StartProcesses(self._plan_of(found, start, {}), settle=not self._plan.drawn_order))
         self.left_out += told["left_out"]
+        nodes = frozenset({*self._graph.nodes} - before)
+        for name, parameters, remappings in told["given"]:
+            self._given.append(telling.Given(self._programs[name], parameters, dict(remappings), nodes))
         return Launched([self._programs[name] for name in told["started"]], told["left_out"])
 
     #: Name and text of files that a launch file may need, beside those that lie around it.

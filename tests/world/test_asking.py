@@ -164,6 +164,16 @@ def test_a_simulation_may_offer_services_and_fail(ros: World) -> None:
         ros.advance(1.0)
 
 
+LAUNCH = """\
+from launch import LaunchDescription
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    return LaunchDescription([Node(package='{}', executable='talker')])
+"""
+
+
 @pytest.fixture
 def workspace(tmp_path: Path) -> Path:
     """A copy of a workspace with a package, and a folder of tests in it."""
@@ -195,8 +205,23 @@ def test_a_launch_file_starts_its_nodes(ros_session: Worlds, workspace: Path) ->
         assert [program.name for program in launched.programs] == ["robot/talker", "robot/listener"]
         assert ros.nodes() == ["/ears/listener", "/speaker"]
         assert ros.rate("/talk") == pytest.approx(5)
-        again = ros.launch("../launch/listener.launch.py")
+        again = ros.launch("robot/listener.launch.py")
         assert [program.name for program in again.programs] == ["robot/listener (2)"]
+        with pytest.raises(SubmissionError) as wrong:
+            ros.launch("robot/listner.launch.py")
+        assert wrong.value.hint == "did you mean robot/listener.launch.py?"
+        with pytest.raises(SubmissionError) as wrong:
+            ros.launch("robto/listener.launch.py")
+        assert wrong.value.hint == "did you mean robot/listener.launch.py?"
+
+
+def test_a_launch_file_beside_its_packages_finds_them(ros_session: Worlds, workspace: Path) -> None:
+    """It lies at the top of the workspace, in no package; the test lies in one."""
+    top = workspace.parents[2]
+    (top / "all.launch.py").write_text(LAUNCH.format("robot"), encoding="utf-8")
+    with ros_session.open(workspace) as ros:
+        launched = ros.launch("../../../all.launch.py")
+        assert [program.name for program in launched.programs] == ["robot/talker"]
 
 
 def test_a_launch_file_does_not_find_what_colcon_leaves_out(ros_session: Worlds, workspace: Path) -> None:
@@ -206,13 +231,8 @@ def test_a_launch_file_does_not_find_what_colcon_leaves_out(ros_session: Worlds,
         other = Path(shutil.copytree(workspace.parent, workspace.parents[1] / name))
         (other / "package.xml").write_text(manifest.replace("<name>robot<", f"<name>{name}<"), encoding="utf-8")
     (workspace.parents[1] / "other/COLCON_IGNORE").touch()
-    launch = (
-        "from launch import LaunchDescription\nfrom launch_ros.actions import Node\n\n\n"
-        "def generate_launch_description():\n"
-        "    return LaunchDescription([Node(package='{}', executable='talker')])\n"
-    )
-    (workspace / "ignored.launch.py").write_text(launch.format("other"), encoding="utf-8")
-    (workspace / "lacking.launch.py").write_text(launch.format("elsewhere"), encoding="utf-8")
+    (workspace / "ignored.launch.py").write_text(LAUNCH.format("other"), encoding="utf-8")
+    (workspace / "lacking.launch.py").write_text(LAUNCH.format("elsewhere"), encoding="utf-8")
     with ros_session.open(workspace) as ros:
         told = r"ignored\.launch\.py:6: PackageNotFoundError: package .other. not found: .* other/COLCON_IGNORE"
         with pytest.raises(HarnessError, match=told):

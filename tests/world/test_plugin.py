@@ -365,23 +365,41 @@ def test_that_fails(ros):
     ros.advance(1.0)
     assert ros.now == 2.0
 
+def test_a_launch_file(ros):
+    ros.launch("given.launch.py")
+    ros.advance(1.0)
+
 def test_with_nothing_to_tell(ros):
     ros.run("echo.py", namespace="/a", remappings={"/in": "words", "/out": "~/said"})
     assert sorted(ros.topics()) == ["/a/echo/said", "/a/words"]
 """
 
 
+GIVEN_BY_LAUNCH = """
+from launch import LaunchDescription
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    given = dict(parameters=[{"late": 1}], remappings=[("inn", "/words"), ("/out", "/said")])
+    return LaunchDescription([Node(package="demo", executable="echo.py", **given)])
+"""
+
+
 def test_parameters_and_remappings_without_effect_are_told(suite: pytest.Pytester) -> None:
     """With the failure of a test, and as a warning of one that passes."""
     suite.makepyfile(test_it=GIVEN)
+    suite.makefile(".launch.py", given=GIVEN_BY_LAUNCH)
     result = suite.runpytest_subprocess("-p", "grader.pytest_plugin", "-p", "no:cacheprovider")
-    result.assert_outcomes(passed=2, failed=1, warnings=2)
+    result.assert_outcomes(passed=3, failed=1, warnings=4)
     text = result.stdout.str()
     failure, _, warnings = text.partition("warnings summary")
     assert "echo.py: the parameter nothing was given, but no node of it declares that" in failure
     told = "echo.py: the remapping of ~/x to y matches no topic or service of its nodes; they have /in, /out"
     assert told in failure
     assert "echo.py: the parameter deley was given, but no node of it declares that" in warnings
+    assert "echo.py: the parameter late was given, but no node of it declares that" in warnings
+    assert "echo.py: the remapping of inn to /words matches no topic or service of its nodes; did you" in warnings
     told = "echo.py: the remapping of /inn to /words matches no topic or service of its nodes; did you mean /in?"
     assert told in warnings
 

@@ -232,6 +232,8 @@ class LaunchedNode(NamedTuple):
     delay_s: float = 0.0  # after the start of the launch file
     file: str = ""  # where it is described: a path in the submission, or the name of a file of the rubric
     line: int = 0
+    parameters: Sequence[str] = ()  # the names of those that the launch file gives this node by name
+    remappings: Sequence[Sequence[str]] = ()  # old and new name of each that it gives this node
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> "LaunchedNode":
@@ -248,6 +250,8 @@ class LaunchedNode(NamedTuple):
             delay_s if isinstance(delay_s, (int, float)) else 0.0,
             _text(data.get("file")),
             _number(data.get("line")) or 0,
+            list(map(_text, _list(data.get("parameters")))),
+            [list(map(_text, one)) for one in _list(data.get("remappings")) if isinstance(one, list) and len(one) == 2],
         )
 
 

@@ -269,6 +269,8 @@ def _added(  # noqa: PLR0913  what one node consists of
         ros_arguments=_texts(node.ros_arguments),
         parameter_files=tuple(files),
         launched_by=where,
+        given_parameters=_texts(node.parameters),
+        given_remappings=tuple((_text(old), _text(new)) for old, new in node.remappings[:ARGUMENTS]),
     )
     # Longer than any scenario is never; also NaN fails both comparisons.
     delay_ns = round(node.delay_s * NS_PER_S) if 0 < node.delay_s < 1e6 else 0

@@ -214,7 +214,9 @@ class SteppedRunner(Runner):
             started.append(student)
         if command.settle:
             self._await_start([student for student in started if student.name not in self._agenda.starts_ns])
-        return {"started": [student.name for student in started], "left_out": left_out}
+        # what starts later has declared nothing yet
+        given = [(one.name, *one.given) for one in started if one.name not in self._agenda.starts_ns]
+        return {"started": [student.name for student in started], "left_out": left_out, "given": given}
 
     def _named(self, process: str) -> NodeProcess:
         return next(student for student in self._students if student.name == process)

@@ -100,6 +100,7 @@ class NodeProcess(Process):
         file: The file that it runs, relative to the submission.
         arguments: What its program is given on the command line.
         launched_by: The launch file that it comes from, with its line; empty if it comes from none.
+        given: The names of parameters, and the remappings, that this launch file gives it.
         places: The files of the submission.
         prefix: The folder below which its packages are installed; empty if it has none.
         keeps_paths: Whether paths stay in what it writes, because it runs where its files lie.
@@ -131,6 +132,7 @@ class NodeProcess(Process):
     file: str = ""
     arguments: str = ""
     launched_by: str = ""
+    given: tuple[tuple[str, ...], tuple[tuple[str, str], ...]] = ((), ())
     places: Places = field(default_factory=lambda: Places(None))
     prefix: str = ""
     keeps_paths: bool = False

@@ -375,6 +375,7 @@ class Worker:
         student.own_folder, student.keeps_paths = _own_folder(environment), bool(plan.working)
         student.silence_s = math.inf if plan.debugger else student.silence_s
         student.launched_by, student.prefix = start.launched_by, next(iter(plan.prefixes), "")
+        student.given = start.given_parameters, start.given_remappings
         return student
 
     def _starter(self, clock: str) -> Starter:

@@ -103,7 +103,21 @@ REPORTS: tuple[Report, ...] = (
     EarlyMessage("/x", 5, 6),
     Parameters([Claim("parameter", "/n:rate", "1.0")]),
     LaunchReport(
-        [LaunchedNode("robot", "robots", "talker", ["a"], ["-r"], [("x.yaml", "a: 1")], 2.5, "a.launch.py", 3)],
+        [
+            LaunchedNode(
+                "robot",
+                "robots",
+                "talker",
+                ["a"],
+                ["-r"],
+                [("x.yaml", "a: 1")],
+                2.5,
+                "a.launch.py",
+                3,
+                ["a"],
+                [["b", "c"]],
+            )
+        ],
         [NotEvaluated("command", "x", "ls", 2, True, "a.launch.py", 4)],
         FAULT,
     ),

@@ -72,8 +72,9 @@ class Node(Action):
         texts = [[os.path.basename(path), read_parameter_file(path)] for path in files]
         # As launch_ros does: without a namespace, the node's own code may set one.
         target = f"{namespace.rstrip('/')}/{name}" if name and namespace is not None else "/**"
+        named: list[str] = []
         for entry in self.parameters:
-            texts += self._parameters(entry, target, context)
+            texts += self._parameters(entry, target, context, named)
         ros = [part for rule in rules for part in ("-r", rule)] + [part for one in given for part in ("-p", one)]
         package = text_of(self.package, context) if self.package is not None else ""
         context.nodes.append(
@@ -87,12 +88,14 @@ class Node(Action):
                 context.delay_s,
                 self.file,
                 self.line,
+                named,
+                [[old, new] for old, new in own],
             )
         )
         return ()
 
-    def _parameters(self, entry: Any, target: str, context: Context) -> list[list[str]]:
-        """Return the name and text of the parameter file for an entry of `parameters`."""
+    def _parameters(self, entry: Any, target: str, context: Context, named: list[str]) -> list[list[str]]:
+        """Return the name and text of the parameter file for an entry of `parameters`; `named` gets those by name."""
         if isinstance(entry, Mapping):
             values = dict(flattened(entry, context))
         elif isinstance(entry, Parameter):
@@ -104,6 +107,7 @@ class Node(Action):
                 context.leave_out(self.file, self.line, LeftOutError("parameter_file", os.path.basename(path)))
                 return []
             return [[os.path.basename(path), read_parameter_file(path)]]
+        named += values
         body = ", ".join(f"{json.dumps(name)}: {yaml_text(value)}" for name, value in values.items())
         return [[f"{{{body}}}", f"{json.dumps(target)}: {{ros__parameters: {{{body}}}}}\n"]]
 
