@@ -10,6 +10,7 @@ import os
 import re
 import sys
 from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
@@ -50,6 +51,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=int,
         metavar="N",
         help="draw from this seed the order of programs and callbacks that are ready at one instant, delays and losses",
+    )
+    group.addoption(
+        "--ros-update",
+        action="store_true",
+        help="write the recordings with which ros.record compares, in place of comparing",
     )
     group.addoption(
         "--ros-debug",
@@ -202,6 +208,7 @@ def ros_session(pytestconfig: pytest.Config) -> Iterator[Worlds]:
             worlds = stack.enter_context(open_worlds(pytestconfig.rootpath, **options))
         except EnvironmentFault as fault:
             pytest.fail(f"{fault.message}\nhint: {fault.hint}" if fault.hint else fault.message, pytrace=False)
+        worlds = replace(worlds, updates_recordings=pytestconfig.getoption("--ros-update"))
         pytestconfig.stash[_SHARED] = worlds.shared
         if hasattr(pytestconfig, "workeroutput"):  # a process of pytest-xdist, which prints nothing itself
             pytestconfig.workeroutput[_OF_WORKER] = worlds.shared

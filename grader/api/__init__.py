@@ -131,10 +131,13 @@ if TYPE_CHECKING:
     from grader.world.asking import PendingCall as PendingCall
     from grader.world.asking import Received as Received
     from grader.world.errors import NoMessage as NoMessage
+    from grader.world.errors import NoTransform as NoTransform
     from grader.world.errors import ParameterRejected as ParameterRejected
     from grader.world.errors import ProgramFailed as ProgramFailed
+    from grader.world.errors import RecordingDiffers as RecordingDiffers
     from grader.world.errors import StepTimeout as StepTimeout
     from grader.world.errors import WrongType as WrongType
+    from grader.world.frames import Transform as Transform
     from grader.world.opening import Worlds as Worlds
     from grader.world.opening import open_world as open_world
     from grader.world.programs import Program as Program
@@ -205,8 +208,11 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.world.opening": "open_world Worlds",
         "grader.world.world": "World Launched Failure",
         "grader.world.asking": "Received PendingCall GoalHandle GoalResult",
+        "grader.world.frames": "Transform",
         "grader.world.programs": "Program",
-        "grader.world.errors": ("ProgramFailed StepTimeout NoMessage ParameterRejected WrongType"),
+        "grader.world.errors": (
+            "ProgramFailed StepTimeout NoMessage NoTransform ParameterRejected RecordingDiffers WrongType"
+        ),
         "grader.runtime.served_actions": "GoalRejected GoalAborted GoalCanceled",
     },
     "Tests": {

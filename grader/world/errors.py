@@ -51,3 +51,21 @@ class NoMessage(IndexError):  # noqa: N818 - the same
         super().__init__(f"{reason}\n  hint: {hint}" if hint else reason)
         self.reason = reason
         self.hint = hint
+
+
+class RecordingDiffers(AssertionError):  # noqa: N818 - the same
+    """What programs published is not what a kept recording has; the message names the first difference."""
+
+
+class NoTransform(LookupError):  # noqa: N818 - the same
+    """Nothing says where a frame is in another one; the message names the link that is missing.
+
+    Attributes:
+        reason: Why there is none, in one line.
+        hint: One thing to do; empty if nothing is very likely right.
+    """
+
+    def __init__(self, reason: str = "", hint: str = "") -> None:
+        super().__init__(f"{reason}\n  hint: {hint}" if hint else reason)
+        self.reason = reason
+        self.hint = hint

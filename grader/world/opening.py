@@ -22,12 +22,14 @@ class Worlds:
         folder: Where programs are looked for last.
         measured: How the lines of programs are measured; see `measured_lines`.
         debugger: Where a debugger of programs is; see `debugger_at`.
+        updates_recordings: Whether tests write the recordings that they would compare with.
     """
 
     session: RecordingSession
     folder: Path
     measured: str = ""
     debugger: str = ""
+    updates_recordings: bool = False
 
     @property
     def shared(self) -> str:
@@ -62,6 +64,7 @@ class Worlds:
         watched = {"measured": self.measured, "debugger": self.debugger}
         options = {**drawn, **watched}
         world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **options)  # type: ignore[arg-type]
+        world.updates_recordings = self.updates_recordings
         try:
             yield world
             world.finish()

@@ -67,7 +67,9 @@ from grader.runtime.steps import (
 from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
 from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
-from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
+from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, RecordingDiffers, StepTimeout, WrongType
+from grader.world.frames import TRANSFORMS, Transform, last_links, transform_between
+from grader.world.golden import KeptMessage, first_difference, kept_lines, read_kept
 from grader.world.interfaces import let_import, modules_for
 from grader.world.programs import (
     Found,
@@ -184,6 +186,7 @@ class World:
     Attributes:
         session: What the programs run in.
         left_out: Sentences about what launch files describe and was not started, in the order in which they were told.
+        updates_recordings: Whether `record` writes what it would compare.
     """
 
     def __init__(  # noqa: PLR0913 - the options of the marker
@@ -237,6 +240,7 @@ class World:
         self._fits = True  # whether nothing has changed since it was looked at whether types and QoS fit
         self._mismatches: set[str] = set()
         self.left_out: list[str] = []
+        self.updates_recordings = False
         self._given: list[telling.Given] = []
         self._started_as: dict[str, _Started] = {}
         self._goals = 0
@@ -901,6 +905,68 @@ class World:
         __tracebackhide__ = True
         found = self.received(topic, type)
         return Messages([one.message for one in found], lambda: self._silence(_absolute(topic)))
+
+    def transform(self, target: str, source: str) -> Transform:
+        """Return where a frame is in another one now, by the last transforms that programs have published.
+
+        Args:
+            target: The frame in which the other one is looked for, such as `map`.
+            source: The other frame, such as `base_link`; its origin in `target` is the translation.
+
+        Raises:
+            NoTransform: The frames are in no tree together; the message names the link that is missing.
+        """
+        __tracebackhide__ = True
+        self._catch_up()
+        sent = sorted((one for topic in TRANSFORMS for one in self._messages.get(topic, ())), key=lambda one: one.t_ns)
+        links = last_links([self._as_object(one) for one in sent])
+        return transform_between(links, target.lstrip("/"), source.lstrip("/"))
+
+    @_with_hint
+    def record(
+        self,
+        file: str | Path,
+        *topics: str,
+        tolerance: float | Mapping[str, float] = 0.0,
+        time_tolerance: float = 0.0,
+    ) -> None:
+        """Compare what programs have published so far with a recording that the test keeps.
+
+        With `pytest --ros-update` the recording is written, and nothing is compared.
+
+        Args:
+            file: The recording, relative to the test; its name ends with `.jsonl`.
+            topics: The topics; none for all that programs have published on, but for those that every node has.
+            tolerance: What numbers may differ by, in their own units; for all topics or by topic.
+            time_tolerance: Seconds by which times may differ. On the wall clock, times are not compared.
+
+        Raises:
+            RecordingDiffers: It differs, or there is no such recording.
+        """
+        __tracebackhide__ = True
+        self._catch_up()
+        path = self._near[0] / file
+        names = [*map(_absolute, topics)] or sorted(set(self._messages) - set(EVERYWHERE))
+        now = [
+            KeptMessage(one.t_ns, name, one.type, plain_fields(self._as_object(one)))
+            for name in names
+            for one in self._messages.get(name, ())
+        ]
+        if self.updates_recordings:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(kept_lines(now), encoding="utf-8")
+            return
+        if not path.is_file():
+            raise RecordingDiffers(f"{path}: expected a recording, found none; pytest --ros-update writes it")
+        kept = [one for one in read_kept(path) if not topics or one.topic in names]
+        allowed = (
+            dict.fromkeys({one.topic for one in (*kept, *now)}, tolerance)
+            if isinstance(tolerance, (int, float))
+            else {_absolute(name): value for name, value in tolerance.items()}
+        )
+        late_ns = None if self._is_real else round(time_tolerance * NS_PER_S)
+        if differs := first_difference(kept, now, allowed, late_ns):
+            raise RecordingDiffers(f"{differs}; recorded in {path}, which pytest --ros-update renews")
 
     def _silence(self, topic: str) -> NoMessage:
         others = {name: "a simulation" for one in self._simulations for name in one.publishes()}

@@ -8,7 +8,7 @@ from tiers import each
 
 #: A block that begins with its file's name.
 _FILE = re.compile(r"^```python\n# (\w+\.py)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-PAGES = {"docs/tutorials/first-test.md": (1 + 2 + 5, 4), "docs/how-to/launch-testing.md": (7, 8)}
+PAGES = {"docs/tutorials/first-test.md": (1 + 2 + 5, 4), "docs/how-to/launch-testing.md": (8, 10)}
 
 pytestmark = pytest.mark.ros
 

@@ -1,0 +1,92 @@
+"""Compares what programs published with a recording that a test keeps, and says where they first differ."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from grader.grading.model.wording import moment, quote
+
+#: What a difference shows of a value, in characters.
+MOST_SHOWN = 80
+
+
+class KeptMessage(NamedTuple):
+    """A message in a kept recording."""
+
+    t_ns: int  # since the test began
+    topic: str
+    type: str
+    message: Any  # its fields as plain values
+
+
+def kept_lines(messages: Sequence[KeptMessage]) -> str:
+    """Return a recording as text, a line for each message, which version control compares line by line."""
+    return "".join(json.dumps(one._asdict(), allow_nan=True) + "\n" for one in messages)
+
+
+def read_kept(path: Path) -> list[KeptMessage]:
+    """Read a recording; raises ValueError with file and line for what is none."""
+    found: list[KeptMessage] = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            found.append(KeptMessage(**json.loads(line)))
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                f"{path}:{number}: expected a message of a kept recording, found {quote(line, 40)}"
+            ) from error
+    return found
+
+
+def first_difference(
+    kept: Sequence[KeptMessage], now: Sequence[KeptMessage], tolerance: Mapping[str, float], late_ns: int | None
+) -> str:
+    """Return where two recordings first differ, as a sentence; empty if they do not.
+
+    Args:
+        kept: The recording that is kept.
+        now: The other one.
+        tolerance: By topic, what numbers may differ by; exactly equal without.
+        late_ns: What times may differ by; None for anything.
+    """
+    for topic in sorted({one.topic for one in (*kept, *now)}):
+        expected, found = ([one for one in each if one.topic == topic] for each in (kept, now))
+        for number, (one, other) in enumerate(zip(expected, found, strict=False), 1):
+            place = f"{topic}, message {number}"
+            if one.type != other.type:
+                return f"{place}: expected {one.type}, found {other.type}"
+            if late_ns is not None and abs(one.t_ns - other.t_ns) > late_ns:
+                return f"{place}: expected at {moment(one.t_ns)}, found at {moment(other.t_ns)}"
+            for field, wanted, got in _differences(one.message, other.message, tolerance.get(topic, 0.0), ""):
+                what = f" of {field}" if field else ""
+                return f"{place} ({moment(other.t_ns)}): expected{what} {_shown(wanted)}, found {_shown(got)}"
+        if len(expected) != len(found):
+            return f"{topic}: expected {len(expected)} messages, found {len(found)}"
+    return ""
+
+
+def _differences(kept: Any, now: Any, tolerance: float, place: str) -> Iterator[tuple[str, Any, Any]]:
+    """Yield each field that differs, with both values."""
+    if isinstance(kept, dict) and isinstance(now, dict) and kept.keys() == now.keys():
+        for name in kept:
+            yield from _differences(kept[name], now[name], tolerance, f"{place}.{name}" if place else name)
+    elif isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
+        for number, (one, other) in enumerate(zip(kept, now, strict=True)):
+            yield from _differences(one, other, tolerance, f"{place}[{number}]")
+    elif not _equal(kept, now, tolerance):
+        yield place, kept, now
+
+
+def _equal(kept: Any, now: Any, tolerance: float) -> bool:
+    numbers = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in (kept, now))
+    if not numbers or kept == now:
+        return bool(kept == now)
+    both_nan = math.isnan(kept) and math.isnan(now)
+    return both_nan or abs(kept - now) <= tolerance
+
+
+def _shown(value: Any) -> str:
+    return quote(json.dumps(value), MOST_SHOWN)
