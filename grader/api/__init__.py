@@ -137,7 +137,7 @@ if TYPE_CHECKING:
     from grader.world.errors import RecordingDiffers as RecordingDiffers
     from grader.world.errors import StepTimeout as StepTimeout
     from grader.world.errors import WrongType as WrongType
-    from grader.world.frames import Transform as Transform
+    from grader.world.frames import FrameTransform as FrameTransform
     from grader.world.opening import Worlds as Worlds
     from grader.world.opening import open_world as open_world
     from grader.world.programs import Program as Program
@@ -208,7 +208,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.world.opening": "open_world Worlds",
         "grader.world.world": "World Launched Failure",
         "grader.world.asking": "Received PendingCall GoalHandle GoalResult",
-        "grader.world.frames": "Transform",
+        "grader.world.frames": "FrameTransform",
         "grader.world.programs": "Program",
         "grader.world.errors": (
             "ProgramFailed StepTimeout NoMessage NoTransform ParameterRejected RecordingDiffers WrongType"

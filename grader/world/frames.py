@@ -18,7 +18,7 @@ TRANSFORMS = ("/tf", "/tf_static")
 
 
 @dataclass(frozen=True, slots=True)
-class Transform:
+class FrameTransform:
     """Where a frame is in another one, and how it is turned there."""
 
     translation: NDArray[Any]  # shape (3,), x, y, z in metres
@@ -41,15 +41,15 @@ class Transform:
         return matrix
 
 
-class Link(NamedTuple):
+class FrameLink(NamedTuple):
     """A frame in its parent, as it was published last."""
 
     parent: str
     child: str
-    transform: Transform
+    transform: FrameTransform
 
 
-def last_links(messages: Iterable[Any]) -> dict[str, Link]:
+def last_links(messages: Iterable[Any]) -> dict[str, FrameLink]:
     """Return the last link of each frame to its parent, by the frame.
 
     Args:
@@ -57,7 +57,7 @@ def last_links(messages: Iterable[Any]) -> dict[str, Link]:
     """
     import numpy as np  # noqa: PLC0415 - as above
 
-    found: dict[str, Link] = {}
+    found: dict[str, FrameLink] = {}
     for stamped in (one for message in messages for one in message.transforms):
         parent, child = stamped.header.frame_id.lstrip("/"), stamped.child_frame_id.lstrip("/")
         moved, turned = stamped.transform.translation, stamped.transform.rotation
@@ -65,11 +65,13 @@ def last_links(messages: Iterable[Any]) -> dict[str, Link]:
         length = float(np.linalg.norm(rotation))
         if not math.isfinite(length) or length == 0:
             raise NoTransform(f"{child} in {parent}: expected a quaternion, found {tuple(map(float, rotation))}")
-        found[child] = Link(parent, child, Transform(np.array([moved.x, moved.y, moved.z]), rotation / length))
+        found[child] = FrameLink(
+            parent, child, FrameTransform(np.array([moved.x, moved.y, moved.z]), rotation / length)
+        )
     return found
 
 
-def transform_between(links: Mapping[str, Link], target: str, source: str) -> Transform:
+def transform_between(links: Mapping[str, FrameLink], target: str, source: str) -> FrameTransform:
     """Return where a frame is in another one; raises NoTransform, which names the link that is missing.
 
     Args:
@@ -85,7 +87,7 @@ def transform_between(links: Mapping[str, Link], target: str, source: str) -> Tr
     return _after(_inverse(_in(links, common, target)), _in(links, common, source))
 
 
-def _up(links: Mapping[str, Link], frame: str) -> Iterator[str]:
+def _up(links: Mapping[str, FrameLink], frame: str) -> Iterator[str]:
     """Yield a frame and all above it; a loop ends where it begins again."""
     seen: set[str] = set()
     while frame not in seen:
@@ -95,18 +97,18 @@ def _up(links: Mapping[str, Link], frame: str) -> Iterator[str]:
             frame = links[frame].parent
 
 
-def _in(links: Mapping[str, Link], above: str, frame: str) -> Transform:
+def _in(links: Mapping[str, FrameLink], above: str, frame: str) -> FrameTransform:
     """Return where a frame is in one above it."""
     import numpy as np  # noqa: PLC0415 - as above
 
-    found = Transform(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    found = FrameTransform(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
     while frame != above:
         found = _after(links[frame].transform, found)
         frame = links[frame].parent
     return found
 
 
-def _missing(links: Mapping[str, Link], target: str, source: str, roots: tuple[str, str]) -> NoTransform:
+def _missing(links: Mapping[str, FrameLink], target: str, source: str, roots: tuple[str, str]) -> NoTransform:
     """Return the error for two frames that are in no tree together."""
     frames = sorted({name for link in links.values() for name in (link.parent, link.child)})
     what = f"no transform from {source} to {target}"
@@ -137,14 +139,14 @@ def _rotated(rotation: NDArray[Any], point: NDArray[Any]) -> NDArray[Any]:
     return found
 
 
-def _after(outer: Transform, inner: Transform) -> Transform:
+def _after(outer: FrameTransform, inner: FrameTransform) -> FrameTransform:
     """Return a transform within another one."""
     turned = _rotated(outer.rotation, inner.translation)
-    return Transform(outer.translation + turned, _product(outer.rotation, inner.rotation))
+    return FrameTransform(outer.translation + turned, _product(outer.rotation, inner.rotation))
 
 
-def _inverse(transform: Transform) -> Transform:
+def _inverse(transform: FrameTransform) -> FrameTransform:
     import numpy as np  # noqa: PLC0415 - as above
 
     back = transform.rotation * np.array([-1.0, -1.0, -1.0, 1.0])
-    return Transform(-_rotated(back, transform.translation), back)
+    return FrameTransform(-_rotated(back, transform.translation), back)

@@ -41,7 +41,7 @@ def read_kept(path: Path) -> list[KeptMessage]:
     return found
 
 
-def first_difference(
+def difference_from_kept(
     kept: Sequence[KeptMessage], now: Sequence[KeptMessage], tolerance: Mapping[str, float], late_ns: int | None
 ) -> str:
     """Return where two recordings first differ, as a sentence; empty if they do not.

@@ -68,8 +68,8 @@ from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
 from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, RecordingDiffers, StepTimeout, WrongType
-from grader.world.frames import TRANSFORMS, Transform, last_links, transform_between
-from grader.world.golden import KeptMessage, first_difference, kept_lines, read_kept
+from grader.world.frames import TRANSFORMS, FrameTransform, last_links, transform_between
+from grader.world.golden import KeptMessage, difference_from_kept, kept_lines, read_kept
 from grader.world.interfaces import let_import, modules_for
 from grader.world.programs import (
     Found,
@@ -906,7 +906,7 @@ class World:
         found = self.received(topic, type)
         return Messages([one.message for one in found], lambda: self._silence(_absolute(topic)))
 
-    def transform(self, target: str, source: str) -> Transform:
+    def transform(self, target: str, source: str) -> FrameTransform:
         """Return where a frame is in another one now, by the last transforms that programs have published.
 
         Args:
@@ -965,7 +965,7 @@ class World:
             else {_absolute(name): value for name, value in tolerance.items()}
         )
         late_ns = None if self._is_real else round(time_tolerance * NS_PER_S)
-        if differs := first_difference(kept, now, allowed, late_ns):
+        if differs := difference_from_kept(kept, now, allowed, late_ns):
             raise RecordingDiffers(f"{differs}; recorded in {path}, which pytest --ros-update renews")
 
     def _silence(self, topic: str) -> NoMessage:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.world.golden import KeptMessage, first_difference, kept_lines, read_kept
+from grader.world.golden import KeptMessage, difference_from_kept, kept_lines, read_kept
 
 S = 1_000_000_000
 
@@ -27,7 +27,7 @@ def test_a_recording_is_read_as_it_was_written(values: list[object], tmp_path_fa
     """With infinities and what is no number, which are equal to themselves here."""
     path = tmp_path_factory.mktemp("kept") / "a.jsonl"
     path.write_text(kept_lines(kept(*values)), encoding="utf-8")
-    assert first_difference(read_kept(path), kept(*values), {}, 0) == ""
+    assert difference_from_kept(read_kept(path), kept(*values), {}, 0) == ""
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_recording_is_read_as_it_was_written(values: list[object], tmp_path_fa
 )
 def test_the_first_difference_is_named(now: list[KeptMessage], says: str) -> None:
     """Numbers may differ by the tolerance of their topic; times not at all."""
-    assert first_difference(kept(1.0, 2.0), now, {"/x": 0.1}, 0) == says
+    assert difference_from_kept(kept(1.0, 2.0), now, {"/x": 0.1}, 0) == says
 
 
 def test_a_file_that_is_no_recording_is_named_with_its_line(tmp_path: Path) -> None:
