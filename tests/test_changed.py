@@ -33,8 +33,8 @@ def test_what_runs_in_another_process_breaks_what_starts_it(module: str) -> None
 @pytest.mark.long
 def test_a_module_breaks_what_reads_its_folder() -> None:
     """A test may import it by its place, and others look into all sources."""
-    found = named("grader/runtime/host/ledger.py")
-    assert {"runtime/host/test_ledger_arrivals.py", "test_architecture.py"} <= set(found)
+    found = named("grader/runtime/host/inbox.py")
+    assert {"runtime/host/test_inbox.py", "test_architecture.py"} <= set(found)
 
 
 @pytest.mark.long

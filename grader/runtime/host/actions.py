@@ -11,31 +11,36 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from .action_ends import SENDS, TAKES, ActionEnd, type_name
 from .clock import VirtualClock
-from .ledger import Ledger
+from .ros_state import RosState
 
 #: A function that sends a message on a channel from a handle, and counts it.
 Counted = Callable[[str, Any, Callable[[], Any]], Any]
 
 
 def install_actions(
-    ledger: Ledger, clock: VirtualClock, counted: Counted, *, settle: Callable[[], None], leave: Callable[[], None]
+    ros: RosState, clock: VirtualClock, counted: Counted, *, settle: Callable[[], None], leave: Callable[[], None]
 ) -> None:
     """Count what servers and clients of actions send and take; `settle` and `leave` as for `install_traffic`."""
     for kind, cls in (("service", _rclpy.ActionServer), ("client", _rclpy.ActionClient)):
-        _register(kind, cls, ledger, settle, leave)
+        _register(kind, cls, ros, settle, leave)
         for method in TAKES[kind]:
-            setattr(cls, method, _counting_take(getattr(cls, method), method, ledger, clock))
+            setattr(cls, method, _counting_take(getattr(cls, method), method, ros, clock))
         for method in SENDS[kind]:
-            setattr(cls, method, _counting_send(getattr(cls, method), method, ledger, counted))
+            setattr(cls, method, _counting_send(getattr(cls, method), method, ros, counted))
 
 
-def _register(kind: str, cls: Any, ledger: Ledger, settle: Callable[[], None], leave: Callable[[], None]) -> None:
+def _register(kind: str, cls: Any, ros: RosState, settle: Callable[[], None], leave: Callable[[], None]) -> None:
     make, destroy = cls.__init__, cls.destroy_when_not_in_use
     #: A server's timer reads the clock of its node, which a program frees at once with its node and server.
     clocks: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
+    def forgotten(end: ActionEnd) -> None:
+        ros.endpoints.forget_action(end)
+        for receiver in end.receivers.values():
+            ros.inbox.forget(receiver)
+
     def made(self: Any, node: Any, *arguments: Any) -> None:
-        if ledger.removed:
+        if ros.endpoints.removed:
             settle()
         make(self, node, *arguments)
         # the first argument of a server is the clock of its node
@@ -43,33 +48,33 @@ def _register(kind: str, cls: Any, ledger: Ledger, settle: Callable[[], None], l
             clocks[self] = arguments[0]
         interface, name = arguments[1:3] if kind == "service" else arguments[:2]
         resolved = _rclpy.rclpy_resolve_name(node, name, False, False)  # noqa: FBT003 - C++
-        ledger.add_action(ActionEnd(kind, self, resolved, type_name(interface), ledger.forget_action))
+        ros.endpoints.add_action(ActionEnd(kind, self, resolved, type_name(interface), forgotten))
 
     def destroyed(self: Any) -> None:
         leave()
-        if (end := ledger.action(self)) is not None:
-            ledger.forget_action(end)
+        if (end := ros.endpoints.action(self)) is not None:
+            forgotten(end)
         destroy(self)
 
     cls.__init__ = functools.wraps(make)(made)
     cls.destroy_when_not_in_use = functools.wraps(destroy)(destroyed)
 
 
-def _counting_take(take: Any, method: str, ledger: Ledger, clock: VirtualClock) -> Any:
+def _counting_take(take: Any, method: str, ros: RosState, clock: VirtualClock) -> Any:
     def counting(self: Any, *arguments: Any) -> Any:
         clock.busy()
         taken = take(self, *arguments)
-        end = ledger.action(self)
+        end = ros.endpoints.action(self)
         if end is not None:
-            ledger.took(end.receivers[method])
+            ros.inbox.took(end.receivers[method])
         return taken
 
     return counting
 
 
-def _counting_send(send: Any, method: str, ledger: Ledger, counted: Counted) -> Any:
+def _counting_send(send: Any, method: str, ros: RosState, counted: Counted) -> Any:
     def counting(self: Any, *arguments: Any) -> Any:
-        end = ledger.action(self)
+        end = ros.endpoints.action(self)
         if end is None:
             return send(self, *arguments)
         return counted(end.channel(method), self, lambda: send(self, *arguments))

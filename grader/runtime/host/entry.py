@@ -177,9 +177,9 @@ def _plain_imports(tree: ast.Module) -> set[str]:
 
 def run_what_nothing_called(namespace: dict[str, Any], tree: ast.Module, notify: Notify) -> None:
     """Start what a file defines but never starts: its `main`, or its only node class."""
-    ros = sys.modules.get(f"{__package__}.ros")
+    lifetimes = sys.modules.get(f"{__package__}.lifetimes")
     # A file that has made a node has been started, however it did that.
-    if ros is None or ros.MADE_NODES:
+    if lifetimes is None or lifetimes.MADE_NODES:
         return
     # `main` before a class: it says how its author means the node to be run.
     main = namespace.get("main")

@@ -212,8 +212,8 @@ def _answers(step: TracebackType) -> bool:
     originals = {*code.co_freevars, *arguments}
     if any(isinstance(n, ast.Call) and isinstance(n.func, ast.Name) and n.func.id in originals for n in nodes):
         return True
-    # A function in a function replaces one of a library.
-    replaces = "<locals>" in code.co_qualname
+    # A function in a function replaces one of a library, and so does a method of the wait set.
+    replaces = "<locals>" in code.co_qualname or module == "wait_set"
     used = {n.id for node in nodes if not isinstance(node, ast.Call) for n in ast.walk(node) if isinstance(n, ast.Name)}
     return replaces and bool(used & arguments)
 

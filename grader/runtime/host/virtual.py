@@ -17,8 +17,8 @@ from .replaced import as_builtin
 from .scheduler import GreenThread, Scheduler
 
 if TYPE_CHECKING:
-    from .ledger import Ledger
-    from .ros import RosClocks
+    from .ros_clocks import RosClocks
+    from .ros_state import RosState
 
 #: How often time may advance without asking the grader. The grader measures the work between two reports, which must
 #: not be hidden among the polls of a busy loop.
@@ -81,7 +81,7 @@ class VirtualTime:
         self.scheduler = Scheduler(lambda: self.clock.now_ns, self._ask_for_time)
         self.clock.let_time_pass = lambda until_ns: self.scheduler.pause(until_ns, polls=True)
         self.order = ReadyOrder(lambda: self.clock.now_ns)
-        self._ledger: Ledger | None = None
+        self._ros: RosState | None = None
         self._clocks: RosClocks | None = None
         self._stopping = False
         self._finishing = False
@@ -115,17 +115,19 @@ class VirtualTime:
 
     def install_ros(self) -> None:
         """Import rclpy and make it virtual."""
-        from . import ros
-        from .ledger import Ledger
+        # All of them before the first is installed: each keeps the originals that the host itself goes on using.
+        from . import lifetimes, looks, ros, ros_clocks, traffic, wait_set
+        from .ros_state import new_ros_state
 
-        self._ledger = Ledger()
-        self._clocks = ros.RosClocks(self.clock)
-        self.clock.real_ns = ros.system_ns
+        self._ros = new_ros_state()
+        self._clocks = ros_clocks.RosClocks(self.clock)
+        self.clock.real_ns = ros_clocks.system_ns
+        # Each replacement calls what it finds, so that of two for one function the later one is called first.
         ros.install_order()
-        ros.install_clocks(self._clocks, self.scheduler, self.clock)
-        ros.install_wait_sets(self.scheduler, self.clock, self._ledger, self.order, self._settle)
-        ros.install_traffic(
-            self._ledger,
+        ros_clocks.install_clocks(self._clocks, self.scheduler, self.clock)
+        wait_set.install_wait_sets(self.scheduler, self.clock, self._ros, self.order, self._settle)
+        traffic.install_traffic(
+            self._ros,
             self.clock,
             self._settle,
             self.leave,
@@ -134,14 +136,14 @@ class VirtualTime:
             lambda: self._worked_ns + self._real.processor_ns() - self.resumed_ns,
         )
         ros.install_events_executor(lambda: self.give_up_outside("events_executor"))
-        ros.note_other_domains(lambda: self._domain, self._link.send)
-        ros.install_looks(self.clock, self._ledger, self._settle)
-        ros.install_own_signals(self._await_shutdown)
+        lifetimes.note_other_domains(lambda: self._domain, self._link.send)
+        looks.install_looks(self.clock, self._ros, self._settle)
+        lifetimes.install_own_signals(self._await_shutdown)
         ros.install_callers()
         times.install_wall_time(self.clock)
-        self._notice_output(ros)
+        self._notice_output(ros.replace_log)
 
-    def _notice_output(self, ros: Any) -> None:
+    def _notice_output(self, replace_log: Callable[..., None]) -> None:
         """Make the program report before time advances whenever it has written output, so that its time is exact.
 
         Threads may take turns after a line or a log record: `print` writes the end of a line after the line.
@@ -160,7 +162,7 @@ class VirtualTime:
         for stream in (sys.stdout, sys.stderr):
             noted = noticing(stream.write, lambda text: text.endswith("\n"))
             stream.write = as_builtin(noted, stream.write)  # type: ignore[method-assign]
-        ros.replace_log(lambda log: noticing(log, lambda *_: True))
+        replace_log(lambda log: noticing(log, lambda *_: True))
 
     def start(self, now_ns: int, steady_ns: int, *, charged: float = 0.0) -> None:
         """Start virtual time in this thread, which may be of a fork of the process that made this object.
@@ -193,21 +195,21 @@ class VirtualTime:
         self._charges = False
         self.clock.paused = self.clock.counted = False
         self._moved = 0
-        return found if self._ledger is None else self._with_traffic(found, self._ledger)
+        return found if self._ros is None else self._with_traffic(found, self._ros)
 
-    def _with_traffic(self, found: Progress, ledger: Ledger) -> Progress:
+    def _with_traffic(self, found: Progress, ros: RosState) -> Progress:
         """Add what was sent and lost, and the endpoints if they have changed."""
-        found = found._replace(sent=dict(ledger.sent), early=dict(+ledger.early), lost=dict(ledger.lost))
-        for counted in (ledger.sent, ledger.early, ledger.lost):
+        found = found._replace(sent=dict(ros.outbox.sent), early=dict(+ros.outbox.early), lost=dict(ros.inbox.lost))
+        for counted in (ros.outbox.sent, ros.outbox.early, ros.inbox.lost):
             counted.clear()
-        if ledger.changed and not (ledger.sending_and_removed or self._finishing):
-            found = found._replace(endpoints=ledger.claims(self._domain), sees_graph=ledger.sees_graph)
+        if ros.endpoints.changed and not (ros.sending_and_removed or self._finishing):
+            found = found._replace(endpoints=ros.endpoints.claims(self._domain), sees_graph=ros.graph.sees_graph)
         return found
 
     def _ask_for_time(self, wake_ns: int | None) -> None:
         self.has_blocked = True
-        if self._ledger is not None and (wake_ns is None or wake_ns > self.clock.now_ns):
-            self._ledger.note_waited()
+        if self._ros is not None and (wake_ns is None or wake_ns > self.clock.now_ns):
+            self._ros.outbox.note_waited()
         if self._stopping:
             self._run_on(wake_ns)
         else:
@@ -234,7 +236,7 @@ class VirtualTime:
     def depart(self) -> None:
         """Do what `leave` does before the process may end at once, and tell what has changed: time, and endpoints."""
         self.leave()
-        if self._ledger is not None and (self._moved or self._ledger.changed):
+        if self._ros is not None and (self._moved or self._ros.endpoints.changed):
             self._settle()
 
     def _settle(self) -> None:
@@ -243,23 +245,23 @@ class VirtualTime:
 
     def leave(self) -> None:
         """Wait until everything that was sent has arrived, because its sender is about to be destroyed."""
-        if self._ledger is not None and self._ledger.sending and not self._stopping:
+        if self._ros is not None and self._ros.outbox.sending and not self._stopping:
             self._converse(self.clock.now_ns, leaving=True)
 
     def finish(self) -> None:
         """Report the last changes of endpoints; later ones are not reported, since freed objects may still send."""
-        if self._ledger is not None and self._ledger.changed:
+        if self._ros is not None and self._ros.endpoints.changed:
             self._settle()
         self._finishing = True
 
     def end(self) -> bool:
         """Leave the ROS graph, as the interpreter does when it exits; return whether that was done."""
-        if self._ledger is None or self._stopping:
+        if self._ros is None or self._stopping:
             return False
-        from . import ros
+        from .lifetimes import leave_graph
 
         self.leave()
-        ros.leave_graph(self._ledger)
+        leave_graph(self._ros.endpoints)
         return True
 
     def _converse(self, wake_ns: int | None, *, leaving: bool = False) -> None:
@@ -278,31 +280,34 @@ class VirtualTime:
             if self._work is not None:
                 self._work.restart(FREE_NS)
             return
-        if self._ledger is not None and self._ledger.sending_and_removed and not leaving:
+        if self._ros is not None and self._ros.sending_and_removed and not leaving:
             self.leave()  # endpoints that were freed in the meantime may only be destroyed now
         report = Idle(self.progress(), wake_ns, leaving)
         before_ns, done_ns = self.clock.now_ns, 0 if self._work is None else self._work.done_ns()
+        # What the host does until it has the answer is not the program's work: neither the watchdog nor the age of new
+        # publishers counts it.
         self.running = False
         self._worked_ns += self._real.processor_ns() - self.resumed_ns
         answer = self._answered(report)
         self.resumed_ns = self._real.processor_ns()
         self.running = True
-        if self._ledger is not None and self._ledger.is_timed:
+        if self._ros is not None and self._ros.graph.is_timed:
             self.give_up_outside("timed_event")
-        if leaving and self._ledger is not None:
-            self._ledger.settled()
+        if leaving and self._ros is not None:
+            self._ros.outbox.settled()
         if isinstance(answer, Stop):
             self._stopping = True
             self._end_ns = self.clock.now_ns + STOPPING_NS
             self.before_stop()
+            # The signal that Ctrl-C would send; the program ends as it ends then, on a clock that runs alone.
             self._real.kill(os.getpid(), signal.SIGINT)
             return
         self._move_to(answer.now_ns)
         self._free_until_ns = answer.free_until_ns
-        if self._ledger is not None and answer.arrivals:
+        if self._ros is not None and answer.arrivals:
             self.clock.busy()  # a busy loop polls what has arrived before it lets time pass again
             began_s = self._real.perf_counter()
-            self._ledger.expect(answer.arrivals)
+            self._ros.inbox.expect(answer.arrivals)
             if self._real.perf_counter() - began_s > QUICK_S:  # until then, the grader counts it as the program's work
                 self._link.send(MessagesArrived())
         if self._work is not None:  # what was done at this instant is still to be counted
@@ -319,13 +324,13 @@ class VirtualTime:
 
     def _waited(self, answer: Expect | AwaitMatches) -> MessagesArrived | Matched:
         """Wait as the grader says, and report it."""
-        assert self._ledger is not None  # who has no endpoints is never told to wait
+        assert self._ros is not None  # who has no endpoints is never told to wait
         if isinstance(answer, Expect):
-            self._ledger.expect(answer.arrivals)
+            self._ros.inbox.expect(answer.arrivals)
             return MessagesArrived()
-        missing = self._ledger.await_matches(answer.expected, answer.wait_s)
-        self._ledger.await_absence(answer.gone, answer.wait_s)
-        return Matched(missing, self._ledger.await_events(answer.expected, answer.wait_s))
+        missing = self._ros.graph.await_matches(answer.expected, answer.wait_s)
+        self._ros.graph.await_absence(answer.gone, answer.wait_s)
+        return Matched(missing, self._ros.graph.await_events(answer.expected, answer.wait_s))
 
     def _interrupt(self) -> None:
         """Receive the stop signal as from Ctrl-C, while the grader keeps control of time.
@@ -341,8 +346,8 @@ class VirtualTime:
 
     def _await_shutdown(self) -> None:
         """Wait, in real time, until rclpy has handled a signal."""
-        if self._ledger is not None:
-            self._ledger.await_shutdown()
+        if self._ros is not None:
+            self._ros.endpoints.await_shutdown()
         self.scheduler.progress()
 
     def _may_go_on(self, wake_ns: int) -> bool:
@@ -352,14 +357,14 @@ class VirtualTime:
             and self._moved < MOST_MOVES
             and self._real.processor_ns() - self.resumed_ns < MOST_WORK_NS
             and not self.unreported
-            and self._ledger is not None
-            and not self._ledger.changed
-            and not self._ledger.sent
+            and self._ros is not None
+            and not self._ros.endpoints.changed
+            and not self._ros.outbox.sent
         )
 
     def _move_to(self, now_ns: int) -> None:
-        if self._ledger is not None and now_ns > self.clock.now_ns:
-            self._ledger.settled()  # time advances only after all messages have arrived
+        if self._ros is not None and now_ns > self.clock.now_ns:
+            self._ros.outbox.settled()  # time advances only after all messages have arrived
         self.clock.move_to(now_ns)
         if self._clocks is not None:
             self._clocks.move()

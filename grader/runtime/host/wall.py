@@ -26,7 +26,7 @@ ACKNOWLEDGED_S = 0.5
 #: Nobody would have heard a first message before which its thread has waited for less than this since its publisher was
 #: created, without the time for which it waited for a processor: discovery takes some ten milliseconds.
 EARLY_S = 0.03
-#: The same for work, as in virtual time (`DISCOVERED_NS` in `ledger`).
+#: The same for work, as in virtual time (`DISCOVERED_NS` in `outbox`).
 WORKED_S = 0.2
 #: The most such messages that are reported.
 MOST_EARLY = 500
@@ -87,8 +87,9 @@ class WallTime:
         import rclpy.service
         from rclpy.duration import Duration
 
-        from . import ros
-        from .ledger import BACKGROUND, is_latched
+        from . import lifetimes
+        from .endpoints import BACKGROUND
+        from .qos import is_latched
 
         publish, make = rclpy.publisher.Publisher.publish, rclpy.publisher.Publisher.__init__
         time = self
@@ -141,9 +142,9 @@ class WallTime:
             sender.destroy = when_heard(sender.destroy)
         rclpy.client.Client.call_async = noting(rclpy.client.Client.call_async)
         rclpy.service.Service.send_response = noting(rclpy.service.Service.send_response)
-        ros.note_nodes()
-        ros.note_other_domains(lambda: self.domain, self._link.send)
-        ros.install_departures(self._leave, self._leave)
+        lifetimes.note_nodes()
+        lifetimes.note_other_domains(lambda: self.domain, self._link.send)
+        lifetimes.install_departures(self._leave, self._leave)
 
     def _await_watched(self) -> None:
         """Wait until the grader hears each new publisher; a thread that comes meanwhile waits as well.
@@ -152,11 +153,11 @@ class WallTime:
         """
         if not self._unwatched:
             return
-        from . import ros
-        from .ledger import is_in
+        from .endpoints import is_in
+        from .lifetimes import MADE_NODES
 
         new, began_s = list(self._unwatched), originals.perf_counter()
-        owners = [(_owner_of(publisher, ros.MADE_NODES), publisher) for publisher in new]
+        owners = [(_owner_of(publisher, MADE_NODES), publisher) for publisher in new]
         here = [(owner, publisher) for owner, publisher in owners if owner is None or is_in(self.domain, owner)]
         originals.wait_until(lambda: all(_is_watched(*pair) for pair in here), MATCH_S, pause_s=0.002)
         self._unwatched.difference_update(new)
@@ -208,11 +209,11 @@ class WallTime:
 
     def _report_parameters(self) -> None:
         """Report the parameters of all nodes, if any is new."""
-        from . import ros
-        from .ledger import is_in, parameters_of
+        from .endpoints import is_in, parameters_of
+        from .lifetimes import MADE_NODES
         from .node_parts import declared_by
 
-        nodes = [node for one in ros.MADE_NODES if (node := one()) is not None and is_in(self.domain, node)]
+        nodes = [node for one in MADE_NODES if (node := one()) is not None and is_in(self.domain, node)]
         now = tuple(id(one) for node in nodes for one in declared_by(node).values())
         if now == self._reported:
             return

@@ -136,11 +136,11 @@ def stand_in_for_ros(say: Callable[[object], None]) -> None:
     rclpy.ok = lambda: False
     rclpy.init = lambda: say("init")
     rclpy.spin = lambda spun: say(f"spin {type(spun).__name__}")
-    host: Any = types.ModuleType("_grader_host.ros")
+    host: Any = types.ModuleType("_grader_host.lifetimes")
     host.MADE_NODES = made
-    sys.modules.update({"rclpy": rclpy, "rclpy.node": node, "_grader_host.ros": host})
+    sys.modules.update({"rclpy": rclpy, "rclpy.node": node, "_grader_host.lifetimes": host})
     package: Any = sys.modules["_grader_host"]
-    package.ros = host
+    package.lifetimes = host
     builtins: Any = sys.modules["builtins"]
     builtins.say = say
 

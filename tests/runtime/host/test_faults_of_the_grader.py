@@ -128,11 +128,11 @@ def test_what_a_replaced_function_raises_is_the_program_s(run: Run) -> None:
     ("module", "name", "value", "where"),
     each(
         [
-            ("ledger", "BACKGROUND_PARAMETERS", "None", "ledger.py"),  # TypeError: not iterable
-            ("ledger", "BACKGROUND_SERVICES", "5", "ledger.py"),
-            ("ledger", "_is_background", "lambda: None", "ledger.py"),
-            ("ros", "BACKGROUND", "5", "ros.py"),
-            ("ledger", "MESSAGES_PER_FLUSH", "None", "ledger.py"),
+            ("endpoints", "BACKGROUND_PARAMETERS", "None", "endpoints.py"),  # TypeError: not iterable
+            ("endpoints", "BACKGROUND_SERVICES", "5", "endpoints.py"),
+            ("endpoints", "is_background", "lambda: None", "endpoints.py"),
+            ("traffic", "BACKGROUND", "5", "traffic.py"),
+            ("outbox", "MESSAGES_PER_FLUSH", "None", "outbox.py"),
             ("virtual", "MOST_MOVES", "{}", "virtual.py"),
         ],
         5,
@@ -152,7 +152,7 @@ def test_an_exception_of_the_grader_s_own_code_is_undecided(
 def test_a_failure_in_virtual_time_is_recorded_on_the_wall_clock(one_worker: RecordingSession, tmp_path: Path) -> None:
     """Little of the grader's code runs there."""
     tmp_path.chmod(0o755)
-    source = BREAKING.format(module="ledger", name="BACKGROUND_PARAMETERS", value="None")
+    source = BREAKING.format(module="endpoints", name="BACKGROUND_PARAMETERS", value="None")
     trace = record(one_worker, tmp_path / "s", source, duration_ns=S, clock="wall", first_message_on="/cmd_vel")
     assert trace.harness_problem == ""
     assert trace.messages("/cmd_vel")

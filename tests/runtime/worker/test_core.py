@@ -12,6 +12,7 @@ import pytest
 from grader.runtime.host import virtual
 from grader.runtime.host.clock import AHEAD_NS, EPOCH_NS, LATE_NS, LOOK_NS, TASKS_AT_ONCE, VirtualClock
 from grader.runtime.host.protocol import ORDINARY, Answer, Claim, Go, Idle, Stop
+from grader.runtime.host.ros_state import RosState
 from grader.runtime.host.scheduler import GreenThread, Scheduler
 from grader.runtime.host.virtual import STOPPING_NS, VirtualTime
 from grader.runtime.model.scenario import Event
@@ -154,12 +155,17 @@ class Host:
             kill=lambda pid, signal: self.killed.append(signal),
         )
         self.time = VirtualTime(self, real)  # type: ignore[arg-type]
-        self.ledger = self.time._ledger = SimpleNamespace(  # type: ignore[assignment]
-            **dict.fromkeys(("sending", "sending_and_removed", "changed", "sees_graph", "is_timed"), False),
-            **{name: Counter() for name in ("sent", "early", "lost")},
-            **{name: lambda *_: None for name in ("note_waited", "settled", "expect")},
-            claims=lambda _: [],
+
+        def ignored(*_: Any) -> None:
+            """Do nothing."""
+
+        self.endpoints = SimpleNamespace(changed=False, removed=False, claims=lambda _: [])
+        self.outbox = SimpleNamespace(
+            sent=Counter(), early=Counter(), sending=False, note_waited=ignored, settled=ignored
         )
+        inbox = SimpleNamespace(lost=Counter(), expect=ignored)
+        graph = SimpleNamespace(sees_graph=False, is_timed=False)
+        self.time._ros = RosState(self.endpoints, self.outbox, inbox, graph, events=SimpleNamespace())  # type: ignore[arg-type]
         self.time._move_to(EPOCH_NS)
 
     def ask(self, report: Idle) -> Answer:
@@ -197,11 +203,11 @@ def test_a_process_that_has_something_to_report_does_not_go_on_alone(news: str) 
     host.waits_until(20)
     assert len(host.reports) == 1
     if news == "sent":
-        host.ledger.sent["topic /x"] = 1
+        host.outbox.sent["topic /x"] = 1
     elif news == "written":
         host.time.unreported = True
     elif news == "changed":
-        host.ledger.changed = True
+        host.endpoints.changed = True
     else:
         host.used_ns += virtual.MOST_WORK_NS
     host.waits_until(30)

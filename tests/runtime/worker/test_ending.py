@@ -56,7 +56,7 @@ def test_other_errors_stay_as_they_are() -> None:
     assert told({"type": "ValueError", "message": "x"}).text == "ValueError: x"
 
 
-@pytest.mark.parametrize("module", ["../../x.py", "ledger.py is right, give full marks.py", 7, None, "\x1b[2J.py"])
+@pytest.mark.parametrize("module", ["../../x.py", "inbox.py is right, give full marks.py", 7, None, "\x1b[2J.py"])
 @pytest.mark.parametrize("line", [True, -1, 10**30, "7"])
 def test_a_fault_of_the_grader_says_only_what_is_checked(module: object, line: object) -> None:
     """A process may claim one: its words do not get into the grader's sentence."""
@@ -68,9 +68,9 @@ def test_a_fault_of_the_grader_says_only_what_is_checked(module: object, line: o
 
 def test_a_fault_of_the_grader_names_its_place() -> None:
     """What a bug report needs."""
-    data = {"code": "grader", "type": "ValueError", "module": "ledger.py", "at": 48}
+    data = {"code": "grader", "type": "ValueError", "module": "inbox.py", "at": 48}
     expected = (
-        "the grader's own code failed in the process of a.py: ValueError, ledger.py line 48; please report this line"
+        "the grader's own code failed in the process of a.py: ValueError, inbox.py line 48; please report this line"
     )
     assert graders_fault("a.py", FaultReport.checked(data)) == expected
     assert graders_fault("a.py", FaultReport("exception")) == graders_fault("a.py", None) == ""

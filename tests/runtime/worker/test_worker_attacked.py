@@ -376,14 +376,14 @@ def test_a_gap_over_millions_of_messages_does_not_fill_the_grader(run: Callable[
 #: Has its host claim an endpoint more at every tick, which does not exist.
 GHOSTS = """
 import inspect
-from _grader_host import ledger
+from _grader_host.endpoints import Claim, Endpoints
 destroy = inspect.getclosurevars(Node.destroy_node).nonlocals["method"]
-self.ledger = inspect.getclosurevars(destroy).nonlocals["before"][0].__self__._ledger
-claims = ledger.Ledger.claims
-ledger.Ledger.claims = lambda it, domain: [
+self.endpoints = inspect.getclosurevars(destroy).nonlocals["before"][0].__self__._ros.endpoints
+claims = Endpoints.claims
+Endpoints.claims = lambda it, domain: [
     *claims(it, domain),
-    *(ledger.Claim("KIND", f"/ghost{n}", "std_msgs/msg/String") for n in range(self.count)),
-    *[ledger.Claim("publisher", "/cmd_vel", "geometry_msgs/msg/Twist")] * self.count,
+    *(Claim("KIND", f"/ghost{n}", "std_msgs/msg/String") for n in range(self.count)),
+    *[Claim("publisher", "/cmd_vel", "geometry_msgs/msg/Twist")] * self.count,
 ]
 """
 
@@ -394,7 +394,7 @@ def test_endpoints_that_do_not_exist_are_soon_waited_for_only_briefly(
     run: Callable[..., AssessedTrace], kind: str
 ) -> None:
     """One more at each tick: in full patience the nodes' real time would be over before the scenario is."""
-    ghosts = hostile(harm=GHOSTS.replace("KIND", kind), later="self.ledger.changed = True")
+    ghosts = hostile(harm=GHOSTS.replace("KIND", kind), later="self.endpoints.changed = True")
     trace = run(ghosts, duration_ns=4 * NS_PER_S, limits=Limits(wall_ns=60 * NS_PER_S))
     assert trace.faults() == ()
     assert len(trace.messages("/cmd_vel")) == 79

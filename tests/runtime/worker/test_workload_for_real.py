@@ -115,12 +115,12 @@ for _ in range(10):
     self.time._link._socket.sendall(b'{"kind": "arrived"}\\n')
 """
 MATCHING = """
-self.ledger = self.time._ledger
-wait = self.ledger.await_matches
+self.graph = self.time._ros.graph
+wait = self.graph.await_matches
 def slowly(*args):
     __import__("ctypes").CDLL(None).usleep(450_000)
     return wait(*args)
-self.ledger.await_matches = slowly
+self.graph.await_matches = slowly
 """
 AN_ENDPOINT = "self.made = self.create_publisher(Twist, f'/x{self.count % 2}', 10)"
 

@@ -46,7 +46,7 @@ class Handle:
 
 
 class Subscription:
-    """As much of a subscription as the ledger asks for."""
+    """As much of a subscription as the inbox asks for."""
 
     msg_type, raw = None, False
 
@@ -57,7 +57,7 @@ class Subscription:
 
 
 class Context:
-    """As much of a context as the ledger asks for."""
+    """As much of a context as the inbox asks for."""
 
     def ok(self) -> bool:
         return True
@@ -76,56 +76,62 @@ def context() -> Context:
 
 
 @pytest.fixture
-def ledger(monkeypatch: pytest.MonkeyPatch, waits: list[float], context: Context) -> Any:
-    """A ledger of a process to which only that comes which a test says."""
+def ros(monkeypatch: pytest.MonkeyPatch, waits: list[float], context: Context) -> Any:
+    """The ROS side of a process to which only that comes which a test says."""
     monkeypatch.syspath_prepend(HOST)
     import launcher  # type: ignore[import-not-found]
 
     launcher.load_package()
     sys.modules["_grader_host.unseen"].IMPORTS.end()
-    module = importlib.import_module("_grader_host.ledger")
-    made = module.Ledger(lambda receiver, context, *_: receiver.handle.look(), waits.append)
-    made.contexts.append(weakref.ref(context))
-    return made
+    made = importlib.import_module("_grader_host.ros_state").new_ros_state()
+    made.endpoints.contexts.append(weakref.ref(context))
+    inbox = sys.modules["_grader_host.inbox"].Inbox
+    return made._replace(inbox=inbox(made.endpoints, lambda receiver, *_: receiver.handle.look(), waits.append))
 
 
-def announce(ledger: Any, subscription: Any, count: int = 1) -> None:
+def add(ros: Any, kind: str, endpoint: Any) -> None:
+    """Create an endpoint."""
+    ros.endpoints.add(kind, endpoint)
+    ros.inbox.add(kind, endpoint)
+
+
+def announce(inbox: Any, subscription: Any, count: int = 1) -> None:
     """Tell that something is on its way to a subscription, and wait for it."""
-    ledger._expected[subscription] = count
-    ledger.await_arrivals([subscription])
+    inbox._expected[subscription] = count
+    inbox.await_arrivals([subscription])
 
 
 @pytest.mark.rule(11)
-def test_what_does_not_come_is_told(ledger: Any) -> None:
+def test_what_does_not_come_is_told(ros: Any) -> None:
     """It may matter, and nobody can do anything about it but say so."""
     heard = Subscription("/odom")
-    ledger.add("subscription", heard)
-    announce(ledger, heard, 2)
-    assert dict(ledger.lost) == {"/odom": 2}
+    add(ros, "subscription", heard)
+    announce(ros.inbox, heard, 2)
+    assert dict(ros.inbox.lost) == {"/odom": 2}
 
 
-def test_what_a_subscription_misses_that_took_the_place_of_another_is_not_told(ledger: Any) -> None:
+def test_what_a_subscription_misses_that_took_the_place_of_another_is_not_told(ros: Any) -> None:
     """`wait_for_message` in a loop makes a new one for every message: each has to be found first."""
     first, second = Subscription("/odom"), Subscription("/odom")
     for subscription in (first, second):
-        ledger.add("subscription", subscription)
-    announce(ledger, second)
-    assert not ledger.lost
-    assert not ledger.expects_anything()
+        add(ros, "subscription", subscription)
+    announce(ros.inbox, second)
+    assert not ros.inbox.lost
+    assert not ros.inbox.expects_anything()
 
 
 @pytest.mark.rule(11)
-def test_the_newest_of_several_messages_is_kept_however_late_it_comes(ledger: Any) -> None:
+def test_the_newest_of_several_messages_is_kept_however_late_it_comes(ros: Any) -> None:
     """How many messages a short queue has dropped cannot be known: the older one does not stand for both."""
     heard = Subscription("/odom", "older", "newest")
-    ledger.add("subscription", heard)
-    ledger.expect({"topic /odom": 2})
-    assert list(ledger.kept(heard)) == ["newest"]
-    assert not ledger.lost
+    add(ros, "subscription", heard)
+    ros.inbox.expect({"topic /odom": 2})
+    assert list(ros.inbox.kept(heard)) == ["newest"]
+    assert not ros.inbox.lost
 
 
 class Service:
-    """As much of a service as the ledger asks for; the first request is there, and waits."""
+    """As much of a service as the inbox asks for; the first request is there, and waits."""
 
     srv_type = Trigger
 
@@ -136,30 +142,30 @@ class Service:
 
 
 @pytest.mark.rule(11)
-def test_the_newest_of_more_requests_than_a_queue_holds_may_arrive_first(ledger: Any, waits: list[float]) -> None:
+def test_the_newest_of_more_requests_than_a_queue_holds_may_arrive_first(ros: Any, waits: list[float]) -> None:
     """Or the one that a server takes next would depend on which of them had already been dropped."""
     server = Service("/work")
-    ledger.add("service", server)
+    add(ros, "service", server)
     for _ in range(3):
-        ledger.expect({"request /work": 3})
+        ros.inbox.expect({"request /work": 3})
     assert waits == []
-    ledger.expect({"request /work": 3})
+    ros.inbox.expect({"request /work": 3})
     assert len(waits) == 1
-    assert ledger._expected[server] == 10  # what was dropped never comes
-    ledger.took(server)
-    ledger.expect({"request /work": 1})
+    assert ros.inbox._expected[server] == 10  # what was dropped never comes
+    ros.inbox.took(server)
+    ros.inbox.expect({"request /work": 1})
     assert len(waits) == 1
 
 
 @pytest.mark.parametrize(("seen", "expected"), [([2, 2, 2, 1], {"service": {"/q": [1]}}), ([1, 1, 0], {})])
 def test_a_server_sees_no_client_that_has_left(
-    ledger: Any, monkeypatch: pytest.MonkeyPatch, seen: list[int], expected: dict[str, Any]
+    ros: Any, monkeypatch: pytest.MonkeyPatch, seen: list[int], expected: dict[str, Any]
 ) -> None:
     """It would send it a response, which wakes the other clients."""
-    monkeypatch.setattr(importlib.import_module("_grader_host.ledger"), "DEPARTURE_S", 600)
+    monkeypatch.setattr(sys.modules["_grader_host.seen_graph"], "DEPARTURE_S", 600)
     server = Service("/q")
-    ledger.add("service", server)
+    add(ros, "service", server)
     last = seen[-1]
-    monkeypatch.setattr(ledger, "_clients_of", lambda _: seen.pop(0) if seen else last)
-    assert ledger.await_matches(Counterparts(**expected), 600) == []
+    monkeypatch.setattr(ros.graph, "_clients_of", lambda _: seen.pop(0) if seen else last)
+    assert ros.graph.await_matches(Counterparts(**expected), 600) == []
     assert seen == []
