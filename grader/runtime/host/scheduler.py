@@ -19,6 +19,8 @@ class GreenThread:
     __slots__ = ("deadline_ns", "gate", "is_new", "native", "parked", "polled_in", "polls")
 
     def __init__(self) -> None:
+        # A real lock that its thread waits for until it is its turn. It begins locked; whoever hands on opens it, and
+        # the thread that passes has locked it again.
         self.gate = originals.allocate_lock()
         self.gate.acquire()
         self.parked = False
@@ -93,7 +95,7 @@ class Scheduler:
             polls: Whether to continue after anything happens, to poll again.
         """
         green_thread = self.mine()
-        if green_thread is None:
+        if green_thread is None:  # a C library has started it: it is not scheduled here, and asks again soon
             originals.sleep(0.001)
             return
         green_thread.deadline_ns, green_thread.polls, green_thread.polled_in, green_thread.parked = (
@@ -163,6 +165,8 @@ class Scheduler:
         following = self._choose()
         if following is green_thread:
             return
+        # From the release on, the other thread runs: `current` has to be right before it, and nothing of the program's
+        # may be touched between the release and the wait.
         self.current, self._others_ran = following, True
         following.gate.release()
         try:

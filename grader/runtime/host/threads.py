@@ -51,7 +51,11 @@ def lock_type(scheduler: Scheduler, clock: VirtualClock) -> Any:
     timeouts = Timeouts(clock)
 
     class VirtualLock:
-        """A lock whose waiters are parked green threads."""
+        """A lock whose waiters are parked green threads.
+
+        No real lock guards its own fields: one green thread runs at a time, and another one only takes its turn where
+        this one calls the scheduler.
+        """
 
         __slots__ = ("__weakref__", "_locked", "_waiters")
 
