@@ -300,8 +300,8 @@ class VirtualWaitSet(REAL_WAIT_SET):  # type: ignore[misc]
                 return
             if not self._expects():
                 if deadline_ns is not None and around.clock.now_ns >= deadline_ns:
-                    # A program that calls `spin_once(timeout_sec=0)` in a loop looks at no clock: each such look counts
-                    # as many, or virtual time would stand still for it.
+                    # A program that does nothing but this, as with `spin_once(timeout_sec=0)` in a loop, only waits for
+                    # time to pass. It looks at no clock by which that could be told.
                     around.clock.idle_look(50)
                     return
                 self._pause(deadline_ns)
