@@ -64,7 +64,7 @@ class WakeUps:
         return [pointer for pointer in ready if pointer not in seen]
 
 
-class Surroundings(NamedTuple):
+class WaitSurroundings(NamedTuple):
     """What every wait of this process depends on."""
 
     scheduler: Scheduler
@@ -85,7 +85,7 @@ class VirtualWaitSet(REAL_WAIT_SET):  # type: ignore[misc]
     """
 
     #: rclpy makes each wait set and knows only its counts, so that all have this from their class.
-    around: ClassVar[Surroundings]
+    around: ClassVar[WaitSurroundings]
 
     def __init__(self, *counts: Any) -> None:
         super().__init__(*counts)
@@ -318,7 +318,7 @@ def install_wait_sets(
     """Replace rclpy's wait set."""
     wake_ups = WakeUps()
     wake_ups.install()
-    VirtualWaitSet.around = Surroundings(scheduler, clock, ros, wake_ups, order, settle)
+    VirtualWaitSet.around = WaitSurroundings(scheduler, clock, ros, wake_ups, order, settle)
     _rclpy.WaitSet = VirtualWaitSet
     for cls in ACTION_READY:
         _install_action_waits(cls)
