@@ -127,19 +127,23 @@ def _counted(  # noqa: PLR0911  as above
     last = counted[-1]
     if last.clock_reason or last.harness_problem:
         return wall
-    noted = replace(last, notes=(*last.notes, CHARGED_NOTE))
     if keeps_pace(plain, last):
-        return noted
+        return _noted(last)
     if surely is None:
         return SURELY_COUNTED
     is_sure = not surely.harness_problem and not keeps_pace(plain, surely)
     if not is_sure and len(counted) < COUNTED_TIMES:
         return COUNTED
-    slower = 1.0 if surely.harness_problem else slower_share(surely, last)
+    fastest = min(counted, key=lambda trace: slower_share(plain, trace))
+    slower = 1.0 if surely.harness_problem else slower_share(surely, fastest)
     if slower == 1:
         return replace(wall, harness_problem=wall.harness_problem or UNCLEAR)
-    slower_ns = round(slower * last.stop_ns)
-    return replace(noted, most_starved_ns=slower_ns, all_starved_ns=slower_ns)
+    slower_ns = round(slower * fastest.stop_ns)
+    return replace(_noted(fastest), most_starved_ns=slower_ns, all_starved_ns=slower_ns)
+
+
+def _noted(counted: AssessedTrace) -> AssessedTrace:
+    return replace(counted, notes=(*counted.notes, CHARGED_NOTE))
 
 
 def _was_held_up(trace: AssessedTrace) -> bool:

@@ -29,6 +29,7 @@ ABOUT = {
     "ActionServer": {"course/authoring/checking.py"},
     "ServiceCalls": {"grading/rubrics/drawing.py", "grading/rubrics/model.py"},
     "Simulated": {
+        "grading/app/interfaces.py",
         "course/authoring/checking.py",
         "course/authoring/starting.py",
         "grading/rubrics/check_parameters.py",

@@ -74,6 +74,10 @@ def noted(trace: AssessedTrace, slower: float = 0) -> AssessedTrace:
         ([PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST), (COUNTED, AS_FAST)], noted(AS_FAST)),
         ([PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST), (COUNTED, FAILED)], replace(BUSY, clock_reason=DRIFTS)),
         ([PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST), COUNT, COUNT], noted(SLOWER, FROM_50_TO_60)),
+        (
+            [PLAIN, COUNT, REAL, (SURELY_COUNTED, AS_FAST), (COUNTED, SLOWEST), (COUNTED, SLOWEST)],
+            noted(SLOWER, FROM_50_TO_60),
+        ),
         ([PLAIN, COUNT, REAL, (SURELY_COUNTED, FAILED), COUNT, COUNT], UNCLEAR_WALL),
         ([PLAIN, (COUNTED, SILENT), REAL, SURE], UNCLEAR_WALL),
         # virtual time does not suit the nodes, and their work may slow them down as well
