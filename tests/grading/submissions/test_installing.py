@@ -314,9 +314,9 @@ def test_packages_of_the_project_have_no_flaw(folder: str) -> None:
 
 
 @pytest.mark.parametrize("folder", ["examples", "student_template"])
-def test_folders_without_packages_are_not_examined(folder: str) -> None:
-    """There is nothing that colcon would build."""
-    assert examine(ROOT / folder) == []
+def test_what_the_project_hands_out_has_no_flaw(folder: str) -> None:
+    """Neither the definitions of an example's interfaces nor folders without packages."""
+    assert [flaw for package in examine(ROOT / folder) for flaw in package.flaws] == []
 
 
 def test_a_path_that_grows_without_end_is_given_up(tmp_path: Path) -> None:
