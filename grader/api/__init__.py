@@ -116,10 +116,14 @@ if TYPE_CHECKING:
     from grader.runtime.served_actions import GoalAborted as GoalAborted
     from grader.runtime.served_actions import GoalCanceled as GoalCanceled
     from grader.runtime.served_actions import GoalRejected as GoalRejected
+    from grader.runtime.simulation import Box as Box
     from grader.runtime.simulation import DifferentialDrive as DifferentialDrive
     from grader.runtime.simulation import Moment as Moment
+    from grader.runtime.simulation import Obstacle as Obstacle
     from grader.runtime.simulation import Output as Output
+    from grader.runtime.simulation import RobotInMap as RobotInMap
     from grader.runtime.simulation import Simulation as Simulation
+    from grader.runtime.simulation import Sketch as Sketch
     from grader.runtime.simulation import Turtle as Turtle
     from grader.runtime.simulation import Unicycle as Unicycle
     from grader.testing import TraceBuilder as TraceBuilder
@@ -202,7 +206,9 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.course.classroom.receiving": "grade_packed UnwantedError",
     },
     "Simulations": {
-        "grader.runtime.simulation": "Simulation Moment Output DifferentialDrive Turtle Unicycle",
+        "grader.runtime.simulation": (
+            "Simulation Moment Output Sketch DifferentialDrive RobotInMap Box Obstacle Turtle Unicycle"
+        ),
     },
     "Own nodes, step by step": {
         "grader.world.opening": "open_world Worlds",

@@ -116,15 +116,14 @@ def built(message: Any, fields: Mapping[str, Any], where: str) -> Any:
     return made
 
 
+#: The types of fields that hold fractions.
+_FRACTIONS = ("float", "double", "long double")
+
+
 def _value(kind: Any, value: Any, part: Any, where: str) -> Any:
     """Convert a plain value for a field of a kind; `part` is the class of the field's current value."""
     if hasattr(kind, "value_type"):
-        if not isinstance(value, (list, tuple)):
-            raise TypeError(value)
-        element = kind.value_type
-        if hasattr(element, "namespaces"):
-            part = getattr(importlib.import_module(".".join(element.namespaces)), element.name)
-        return [_value(element, item, part, where) for item in value]
+        return _values_of(kind.value_type, value, part, where)
     if hasattr(kind, "namespaces"):
         if not isinstance(value, Mapping):
             raise TypeError(value)
@@ -132,11 +131,22 @@ def _value(kind: Any, value: Any, part: Any, where: str) -> Any:
     typename = getattr(kind, "typename", "")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return value
-    if typename in ("float", "double", "long double"):
+    if typename in _FRACTIONS:
         return float(value)
     if typename == "octet":
         return bytes([int(value)])
     return int(value) if float(value).is_integer() else value
+
+
+def _values_of(element: Any, value: Any, part: Any, where: str) -> list[Any]:
+    """Convert a list of plain values for a field whose elements are of a kind."""
+    if not isinstance(value, (list, tuple)):
+        raise TypeError(value)
+    if getattr(element, "typename", "") in _FRACTIONS and all(type(item) is float for item in value):
+        return list(value)  # a scan has hundreds
+    if hasattr(element, "namespaces"):
+        part = getattr(importlib.import_module(".".join(element.namespaces)), element.name)
+    return [_value(element, item, part, where) for item in value]
 
 
 def _name(message: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Any, get_args
 
 from grader.runtime.model.dataclass import dataclass
@@ -106,6 +107,7 @@ class Simulate:
         publishes: Topics with their types.
         hears: Topics, each with the types that it takes.
         serves: Services with their types.
+        records: Topics that are only recorded, with their types.
     """
 
     number: int
@@ -113,6 +115,7 @@ class Simulate:
     publishes: Mapping[str, str]
     hears: Mapping[str, tuple[str, ...]]
     serves: Mapping[str, str]
+    records: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,8 @@ from grader.runtime.model.trace import Message, unmet_policy
 from grader.runtime.plan import Plan, PlannedStart, derive
 from grader.runtime.recording.codec import from_json, observation_to_json, to_json
 from grader.runtime.session import TestJob, WorkerLostError
+from grader.runtime.simulation import WallMap
+from grader.runtime.simulation.loading import SimulationError
 from grader.runtime.steps import LaunchFailedError
 from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
@@ -132,6 +134,12 @@ class GradedWorld(World):
     def full(self) -> str:
         """The limit that ended the recording, as a sentence; empty if none did."""
         return self._run.full
+
+    def _simulations_by_name(self) -> Mapping[str, tuple[str, bytes]]:
+        return {name: (path, content) for name, path, content in self._job.test.simulations}
+
+    def _maps(self) -> Mapping[str, WallMap]:
+        return dict(self._job.test.maps)
 
     def _found(self, program: Runnable) -> Found:
         if callable(program):
@@ -297,6 +305,9 @@ def _found_by(item: pytest.Item, when: str, failure: pytest.ExceptionInfo[BaseEx
     """Return what a failure means: a verdict on the submission, a mistake of the test, or a problem of the grader."""
     error = failure.value
     world = item.stash.get(_WORLD, None)
+    if isinstance(error, SimulationError):
+        one = error.mistake
+        return {"mistake": {"file": one.file, "line": one.line, "text": one.text}}
     if isinstance(error, HarnessError):
         return {"problem": error.message}
     if (found := _of_programs(error, world)) is not None:

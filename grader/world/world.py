@@ -15,9 +15,10 @@ from random import Random
 from typing import Any, ParamSpec, TypeVar
 
 from grader.grading.model.wording import first_few, nearest
-from grader.runtime.message_classes import built, plain_fields
+from grader.runtime.message_classes import built, plain_fields, wanted_class
+from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.errors import GraderError, RecordingError
+from grader.runtime.model.errors import GraderError, HarnessError, RecordingError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import GIB, MIB, NS_PER_S, seconds
 from grader.runtime.model.trace import (
@@ -34,6 +35,7 @@ from grader.runtime.model.trace import (
     OutputLine,
     Response,
 )
+from grader.runtime.model.wording import printable
 from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
 from grader.runtime.programs.executables import package_of
 from grader.runtime.serialization import (
@@ -49,8 +51,8 @@ from grader.runtime.serialization import (
 )
 from grader.runtime.served_actions import TOPICS_OF_ACTIONS, ServedAction
 from grader.runtime.session import RecordingSession, SteppedRun
-from grader.runtime.simulation import Moment, Simulation, types_heard
-from grader.runtime.simulation.loading import made_simulation
+from grader.runtime.simulation import SIMULATIONS, Moment, Simulation, WallMap, types_heard
+from grader.runtime.simulation.loading import SimulationError, begin_of, guarded, made_simulation
 from grader.runtime.steps import (
     Advance,
     CallService,
@@ -237,6 +239,7 @@ class World:
         self._expected: list[Failure] = []
         self._failing: list[tuple[Program, Fault]] = []
         self._simulations: list[Simulation] = []
+        self._authored: list[tuple[str, str]] = []  # name and file of each, if it is one of a rubric's own
         self._fits = True  # whether nothing has changed since it was looked at whether types and QoS fit
         self._mismatches: set[str] = set()
         self.left_out: list[str] = []
@@ -846,25 +849,85 @@ class World:
         """Let a simulation take part from now on; its methods run in the test's process, while time stands still.
 
         Args:
-            simulation: An object of a class that derives from `grader.api.Simulation`, or the name of a built-in one.
-            **parameters: Of a built-in one.
+            simulation: An object of a class that derives from `grader.api.Simulation`, or the name of a built-in one;
+                in the tests of a rubric also that of one of its own, from the files under `simulations`.
+            **parameters: Of one that is named.
 
         Returns:
             The simulation, whose state the test may look at.
 
         Raises:
             WrongType: A program uses one of its topics or services with another type.
+            ValueError: No simulation has this name, or it does not take the parameters.
         """
         __tracebackhide__ = True
+        name, path, content = "", "", b""
         if isinstance(simulation, str):
-            simulation = made_simulation(simulation, "", b"", parameters)
+            name, (path, content) = simulation, self._simulations_by_name().get(simulation, ("", b""))
+            simulation = self._made(name, path, content, parameters)
         number = len(self._simulations)
         self._simulations.append(simulation)
-        simulation.begin(Random(derive(self._seed, "simulation", str(number))))  # noqa: S311 - it has to repeat
-        publishes, hears, serves = simulation.publishes(), types_heard(simulation.hears()), simulation.serves()
+        self._authored.append((name, path))
+        draw = Random(derive(self._seed, "simulation", str(number)))  # noqa: S311 - it has to repeat
+        self._asked(number, "begin", draw)
+        publishes, serves, records = (dict(self._asked(number, key)) for key in ("publishes", "serves", "records"))
+        hears = types_heard(self._asked(number, "hears"))
         self._fits = False
-        self._perform(Simulate(number, simulation.period, dict(publishes), hears, dict(serves)))
+        self._perform(Simulate(number, simulation.period, publishes, hears, serves, records))
         return simulation
+
+    def _simulations_by_name(self) -> Mapping[str, tuple[str, bytes]]:
+        """Return file and text of each simulation of a rubric's own."""
+        return {}
+
+    def _maps(self) -> Mapping[str, WallMap]:
+        """Return the maps of a rubric, by name."""
+        return {}
+
+    def _made(self, name: str, path: str, content: bytes, parameters: Mapping[str, Any]) -> Simulation:
+        """Make a simulation by its name; raises ValueError for what the test asks wrongly."""
+        known = {**dict.fromkeys(SIMULATIONS), **dict.fromkeys(self._simulations_by_name())}
+        if name not in known:
+            raise ValueError(f"simulate: expected one of {first_few(list(known), 20)}, found {name!r}")
+        try:
+            return made_simulation(name, path, content, parameters, self._maps())
+        except SimulationError as error:
+            if isinstance(error.__cause__, TypeError) and "__init__()" in str(error.__cause__):
+                raise ValueError(f"simulate: {name}: {error.__cause__}") from None  # it does not take what is given
+            raise
+        except HarnessError as error:
+            raise ValueError(f"simulate: {error.message}") from None
+
+    def _asked(self, number: int, method: str, *arguments: Any) -> Any:
+        """Call a method of a simulation; a mistake in one of a rubric's own raises SimulationError with its place."""
+        name, path = self._authored[number]
+        simulation = self._simulations[number]
+
+        def work() -> Any:
+            answer = getattr(simulation, method)(*arguments)
+            return answer if answer is None or isinstance(answer, Mapping) else [*answer]
+
+        return guarded(name, path, work, begin_of(simulation, method, path)) if path else work()
+
+    def _checked(self, number: int, method: str, answer: Any) -> Any:
+        """Return what a simulation publishes; raises SimulationError for what is no message of its topics."""
+        simulation, (name, path) = self._simulations[number], self._authored[number]
+        types = {**simulation.publishes(), **simulation.records()} if path and isinstance(answer, list) else {}
+        try:
+            for output in answer if types else ():
+                topic, fields = output
+                built(wanted_class(types[topic], "msg", topic), fields, topic)
+        except (HarnessError, TypeError, ValueError, KeyError, AttributeError) as error:
+            found = (
+                error.message
+                if isinstance(error, HarnessError)
+                else f"{printable(str(output), 80)}, expected one of its "
+            )
+            if not isinstance(error, HarnessError):
+                found += f"topics ({', '.join(types)}) with the fields of a message"
+            text = f"the simulation `{name}` failed in {method}(): {found}"
+            raise SimulationError(AuthorMistake(path, begin_of(simulation, method, path), text)) from error
+        return answer
 
     # --------------------------------------------------------------- looking
 
@@ -1220,9 +1283,13 @@ class World:
     def _answered(self, question: Mapping[str, Any]) -> Any:
         """Answer a question of the worker: what a simulation does, or what a served function responds."""
         if question["ask"] == "simulation":
-            now = Moment(question["now_ns"], question["clock_ns"])
-            answer = getattr(self._simulations[question["number"]], question["method"])(now, *question["arguments"])
-            return dict(answer) if isinstance(answer, Mapping) else [*answer]
+            now, number, method = (
+                Moment(question["now_ns"], question["clock_ns"]),
+                question["number"],
+                question["method"],
+            )
+            answer = self._checked(number, method, self._asked(number, method, now, *question["arguments"]))
+            return dict(answer) if isinstance(answer, Mapping) else answer
         if question["ask"] == "action":
             now = Moment(question["now_ns"], question["clock_ns"])
             done = self._actions[question["action"]].attend(

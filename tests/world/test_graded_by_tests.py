@@ -485,3 +485,98 @@ def test_a_class_is_graded_by_tests(tmp_path: Path) -> None:
     assert done.returncode in (0, 1), done.stdout + done.stderr
     results = json.loads((tmp_path / "results/batch.json").read_text())["students"]
     assert [one["score"] for one in results] == [7, 4]
+
+
+DRIVE = """
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+
+rclpy.init()
+node = Node("drive")
+commands = node.create_publisher(Twist, "/cmd_vel", 10)
+go = Twist()
+go.linear.x = 0.5
+node.create_timer(0.1, lambda: commands.publish(go))
+rclpy.spin(node)
+"""
+WORLD = """\
+from dataclasses import dataclass
+
+from grader.api import DifferentialDrive
+
+
+@dataclass
+class Track(DifferentialDrive):
+    wall: float = 2.0
+    breaks: float = 99.0
+
+    def records(self):
+        return {"/left": "std_msgs/msg/Float64"}
+
+    def step(self, now):
+        yield from super().step(now)
+        if now.t_s > self.breaks:
+            yield "/left", {"dat": 1 / 1}
+        yield "/left", {"data": self.wall - self.x}
+
+    def place(self, x, y):
+        self.x, self.y = min(x, self.wall), y
+
+
+SIMULATIONS = {"track": Track}
+"""
+ON_TRACK = """
+import pytest
+
+
+@pytest.mark.points(1)
+def test_drives(ros):
+    track = ros.simulate("track", wall=1.5)
+    ros.run("obstacle_stop.py")
+    ros.advance(6.0)
+    assert track.x == 1.5
+
+
+@pytest.mark.points(1)
+def test_keeps_clear(ros):
+    robot = ros.simulate("robot_in_map", map="room.yaml")
+    ros.run("obstacle_stop.py")
+    ros.advance(6.0)
+    assert not robot.clearance(robot.x, robot.y) < 0.3, "it drives into the wall"
+"""
+
+
+@pytest.mark.breadth(2, 4)
+@pytest.mark.parametrize(
+    ("tests", "told"),
+    [
+        (ON_TRACK, ""),
+        (
+            ON_TRACK.replace("wall=1.5", "breaks=1.0"),
+            "track.py:14: the simulation `track` failed in step(): /left: expected a field of std_msgs/Float64 (data)",
+        ),
+        (ON_TRACK.replace("wall=1.5", "walls=1.5"), "test_robot.py:7: ValueError: simulate: track: "),
+        (
+            ON_TRACK.replace('"track"', '"trak"'),
+            "test_robot.py:7: ValueError: simulate: expected one of differential_drive, robot_in_map, turtle, track,",
+        ),
+    ],
+    ids=["right", "breaks", "parameter", "name"],
+)
+def test_a_test_lets_the_simulations_of_its_rubric_take_part(
+    grade: Grade, tmp_path: Path, tests: str, told: str
+) -> None:
+    """By their names, with the maps of the rubric; a mistake in one is its author's, with file and line."""
+    course = tmp_path / "course"
+    course.mkdir()
+    (course / "track.py").write_text(WORLD)
+    (course / "room.yaml").write_text("image: room.pgm\nresolution: 0.1\norigin: [-2, -2, 0]\n")
+    (course / "room.pgm").write_text("P2 40 40 1\n" + "1 " * 39 + "0 " + ("0 " + "1 " * 38 + "0 ") * 39)
+    text = RUBRIC.replace("400", "20000") + "simulations: [track.py]\nmaps: [room.yaml]\n"
+    report = grade(DRIVE, tests, rubric=text)
+    drives, clear = verdicts(report).values()
+    assert (clear.outcome, clear.reason) == (Outcome.NOT_MET, "it drives into the wall")
+    said = f"{drives.reason} {' '.join(report.exercises[0].notes)}"
+    assert drives.outcome is (Outcome.UNDECIDED if told else Outcome.MET), said
+    assert told in said

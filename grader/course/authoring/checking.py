@@ -116,7 +116,7 @@ def _given(scenario: Scenario) -> set[str]:
     offered_by_plan = (one.action for one in scenario.stimuli if isinstance(one, ActionServer))
     names |= {f"{action}/_action/{topic}" for action in offered_by_plan for topic in ("feedback", "status")}
     for one in _simulations(scenario):
-        names |= {*one.publishes, *one.serves}
+        names |= {*one.publishes, *one.serves, *one.records}
     return names
 
 

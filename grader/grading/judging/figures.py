@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
@@ -21,8 +22,10 @@ from grader.grading.model.chart import (
     Excerpt,
     Figure,
     GraphFigure,
+    Look,
     Panel,
     Playback,
+    Series,
     SourceFile,
     Stage,
     Tone,
@@ -36,6 +39,7 @@ from grader.runtime.model.quantities import counted, seconds
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Submission
 from grader.runtime.model.trace import GraphSnapshot, Request, Response, Trace
+from grader.runtime.model.worlds import Sketch
 
 
 def illustrated(
@@ -101,6 +105,7 @@ def figures_of(
     if graph is not None and graphs:
         figures.append(replace(graph, criteria=graphs))
     told = {id_ for figure in figures for id_ in figure.criteria}
+    figures += _pictures(exercise, traces)
     figures += _playbacks(exercise, traces, told)
     return tuple(replace(f, id=f"{exercise.id}-{number}") for number, f in enumerate(figures, 1))
 
@@ -173,6 +178,33 @@ def _covers(panel: Panel, other: Panel) -> bool:
     alike = (panel.title, panel.unit, panel.lanes, panel.grid) == (other.title, other.unit, other.lanes, other.grid)
     parts = ((panel.series, other.series), (panel.bands, other.bands), (panel.levels, other.levels))
     return alike and all(all(part in mine for part in theirs) for mine, theirs in parts)
+
+
+def _pictures(exercise: Exercise, traces: Mapping[str, Trace]) -> Iterable[Chart]:
+    """Yield what the simulations of each recording have drawn, for the criteria about that recording."""
+    recorded = [s.id for s in exercise.scenarios if s.id in traces]
+    for id_ in recorded:
+        criteria = tuple(c.id for c in exercise.criteria if c.scenario == id_)
+        if traces[id_].drawn and criteria:
+            title = f"Seen from above: {id_.replace('_', ' ')}" if len(recorded) > 1 else "Seen from above"
+            yield replace(picture_of(traces[id_].drawn, title), scenario=id_, criteria=criteria)
+
+
+def picture_of(drawn: Sequence[Sketch], title: str) -> Chart:
+    """Return what simulations have drawn as a chart with the same scale on both axes.
+
+    Args:
+        drawn: Each thing with its lines.
+        title: Title of the chart.
+    """
+    rows = []
+    for sketch in drawn:
+        points = [point for line in sketch.lines for point in (*line, (math.nan, math.nan))][:-1]
+        look = Look.DOTS if sketch.dots else Look.LINE
+        shown = [point for point in points if not (sketch.dots and math.isnan(point[0]))]
+        rows.append(Series(sketch.name, tuple(shown), look, Tone(sketch.tone)))
+    said = ", ".join(f"{sketch.name}: {counted(sum(map(len, sketch.lines)), 'point')}" for sketch in drawn)
+    return Chart("picture", title, f"{said}.", (), "x", "m", (Panel("y", "m", tuple(rows)),), square=True)
 
 
 def _playbacks(exercise: Exercise, traces: Mapping[str, Trace], told: Set[str]) -> Iterable[Playback]:

@@ -62,6 +62,7 @@ from grader.grading.rubrics.units import format_quantity
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import DurationNs, FieldOf, Hertz, Kind, Least, Unit, seconds
 from grader.runtime.model.scenario import FieldSpec
+from grader.runtime.model.worlds import WallMap
 from grader.runtime.stimuli import Simulated
 
 T = TypeVar("T")
@@ -210,18 +211,31 @@ class _SimulationParameters(Shape):
     name: ClassVar[str]
     path: ClassVar[str]
     content: ClassVar[bytes]
+    maps: ClassVar[tuple[tuple[str, WallMap], ...]]
 
     def built(self) -> Simulated:
         """Return the stimulus, with the parameters that are given."""
-        # Values are drawn in this order; that of the set of names is another one in each process.
-        given = {
-            name: plain_value(getattr(self, name)) for name in type(self).model_fields if name in self.model_fields_set
-        }
-        parameters = {key.removeprefix(_PREFIX): value for key, value in given.items()}
-        return Simulated(self.name, parameters, self.path, self.content)
+        return Simulated(self.name, _given(self), self.path, self.content, maps=self.maps)
 
 
-def simulation_shape(name: str, kind: type, path: str = "", content: bytes = b"") -> type[Shape]:
+class _PartOfSimulation(Shape):
+    """A part of a simulation, such as an obstacle; what it consists of may be drawn from the seed."""
+
+    def built(self) -> Mapping[str, Any]:
+        """Return what is given of it."""
+        return _given(self)
+
+
+def _given(shape: Shape) -> dict[str, Any]:
+    """Return what a rubric gives, by name; what it leaves out is not there."""
+    # Values are drawn in this order; that of the set of names is another one in each process.
+    names = [name for name in type(shape).model_fields if name in shape.model_fields_set]
+    return {name.removeprefix(_PREFIX): plain_value(getattr(shape, name)) for name in names}
+
+
+def simulation_shape(
+    name: str, kind: type, path: str = "", content: bytes = b"", maps: tuple[tuple[str, WallMap], ...] = ()
+) -> type[Shape]:
     """Return the model of a simulation's parameters.
 
     Args:
@@ -229,10 +243,24 @@ def simulation_shape(name: str, kind: type, path: str = "", content: bytes = b""
         kind: Its class, a dataclass.
         path: The author's file with the class; empty for a built-in one.
         content: The text of that file.
+        maps: The maps of the rubric, by name.
 
     Raises:
         TypeError: A parameter has a type for which there is no rubric syntax.
     """
+    model = create_model(
+        f"{kind.__name__}Simulation", __base__=_SimulationParameters, __doc__=_summary(kind), **_drawable_fields(kind)
+    )
+    model.made, model.name, model.path, model.content, model.maps = kind, name, path, content, maps
+    return model
+
+
+def _summary(kind: type) -> str:
+    return " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split())
+
+
+def _drawable_fields(kind: type) -> dict[str, Any]:
+    """Return the fields of a model for a dataclass whose numbers, truth values and texts may be drawn."""
     hints, forms = get_type_hints(kind, include_extras=True), _forms(kind)
     fields: dict[str, Any] = {}
     # a parameter is explained where it is written, which may be a base class
@@ -243,20 +271,26 @@ def simulation_shape(name: str, kind: type, path: str = "", content: bytes = b""
             accepted = _drawable(hints[field.name], forms.get(field.name, Text))
             description = meanings.get(field.name)
             fields[f"{_PREFIX}{field.name}"] = (accepted, Field(default, alias=field.name, description=description))
-    summary = " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split())
-    model = create_model(f"{kind.__name__}Simulation", __base__=_SimulationParameters, __doc__=summary, **fields)
-    model.made, model.name, model.path, model.content = kind, name, path, content
-    return model
+    return fields
 
 
 def _drawable(annotation: object, form: object) -> object:
     """Return the type that a rubric may hold for a parameter; a number, truth value or text may be drawn."""
+    if get_origin(annotation) is tuple and get_args(annotation)[1:] == (...,):
+        (part,) = get_args(annotation)[:1]
+        if isinstance(part, type) and dataclasses.is_dataclass(part):
+            return tuple[_part_of_simulation(part), ...]  # type: ignore[misc]
     if isinstance(annotation, type) and dataclasses.is_dataclass(annotation):
-        raise TypeError(f"no rubric syntax for a parameter annotated {annotation!r}")
+        raise TypeError(f"no rubric syntax for a parameter annotated {annotation!r}: write a tuple of them")
     accepted = _accepted(annotation, form)
     drawn = {float: DrawnNumber, int: DrawnWhole, bool: DrawnYesNo, str: DrawnText}
     known = next((shape for kind, shape in drawn.items() if annotation is kind), None)
     return accepted if known is None else Either[accepted, known]  # type: ignore[misc, valid-type]
+
+
+@lru_cache(maxsize=64)
+def _part_of_simulation(kind: type) -> type[Shape]:
+    return create_model(kind.__name__, __base__=_PartOfSimulation, __doc__=_summary(kind), **_drawable_fields(kind))
 
 
 def part_model(cls: type, name: str, aliases: Mapping[str, str] | None = None, **usual: Any) -> type[Shape]:

@@ -311,7 +311,7 @@ class _Checked:
 
         for path, offered_ in self._simulated:
             for topic, value in offered_.outputs:
-                wrong = self._wrong_output(value, offered_.publishes[topic], topic)
+                wrong = self._wrong_output(value, {**offered_.publishes, **offered_.records}[topic], topic)
                 if wrong:
                     yield self._tree.at_key(path).mistake(f"expected a simulation that runs, found that {wrong}")
                     break

@@ -21,6 +21,7 @@ from grader.grading.rubrics.author_modules import OwnHints
 from grader.grading.rubrics.draws import Draw, First
 from grader.grading.rubrics.exercise_checks import hints_of, known_checks
 from grader.grading.rubrics.interfaces import Interfaces, interface_mistakes
+from grader.grading.rubrics.maps import map_files, maps_of
 from grader.grading.rubrics.mistakes import mistakes_of, nearest_hint
 from grader.grading.rubrics.model import CriterionShape, RubricShape, ScenarioShape, feedback_of, rubric_model
 from grader.grading.rubrics.own_checks import (
@@ -39,7 +40,15 @@ from grader.grading.rubrics.own_checks import (
 from grader.grading.rubrics.run_options import RunShape
 from grader.grading.rubrics.simulations import published_by, simulation_mistakes
 from grader.grading.rubrics.tests import AuthoredTest, tests_in
-from grader.grading.rubrics.types import BESIDE, CHECK_FILE, PROVIDED_FILE, PROVIDED_WORDS, plain_value
+from grader.grading.rubrics.types import (
+    BESIDE,
+    CHECK_FILE,
+    MAP_FILE,
+    MAP_WORDS,
+    PROVIDED_FILE,
+    PROVIDED_WORDS,
+    plain_value,
+)
 from grader.grading.rubrics.variants import (
     VariantOptions,
     Variants,
@@ -77,6 +86,7 @@ from grader.runtime.model.scenario import (
     shortest,
 )
 from grader.runtime.model.wording import listed, printable
+from grader.runtime.simulation import WallMap
 
 
 def broken_links(rubric: RubricShape, tree: YamlTree) -> list[Mistake]:
@@ -272,6 +282,7 @@ class _Brought:
     checks: Mapping[str, type]
     own: frozenset[str]  # the names of its own checks
     simulations: Mapping[str, OwnSimulation]
+    maps: Mapping[str, WallMap]
     provided: Mapping[str, str]
     hints: OwnHints
     test_file: OwnFile | None = None
@@ -304,6 +315,7 @@ def read_rubric(
     files = own_files(path, _own_names(path, tree, "checks"), submissions)
     hints = own_files(path, _own_names(path, tree, "hints"), submissions, key="hints")
     simulated = own_files(path, _own_names(path, tree, "simulations"), submissions, key="simulations")
+    maps = map_files(path, _own_names(path, tree, "maps"), submissions)
     others = own_files(path, _own_names(path, tree, "provided"), submissions, key="provided")
     tests = own_files(path, _own_names(path, tree, "pytest"), submissions, key="pytest")
     own = load_checks(files, CHECKS if checks is None else checks)
@@ -313,6 +325,7 @@ def read_rubric(
         usable,
         frozenset(own),
         load_simulations(simulated),
+        maps_of(maps),
         provided,
         load_hints(hints, usable),
         next(iter(tests), None),
@@ -321,7 +334,7 @@ def read_rubric(
     definitions = definition_files(path, folders := _own_names(path, tree, "interfaces"), submissions)
     bags = bag_files(path, named_bags(tree.data), submissions)
     digest = rubric_digest(
-        content, tuple(dict.fromkeys((*files, *hints, *others, *simulated, *tests, *definitions, *bags)))
+        content, tuple(dict.fromkeys((*files, *hints, *others, *simulated, *maps, *tests, *definitions, *bags)))
     )
     if interfaces is not None and folders:
         interfaces = interfaces.including([path.parent / folder for folder in folders])
@@ -389,7 +402,12 @@ def _exercise(
     path: Path, tree: YamlTree, brought: _Brought, digest: str, interfaces: Interfaces | None = None
 ) -> Exercise:
     tested = brought.test_file is not None
-    model = rubric_model(tuple(brought.checks.items()), tuple(brought.simulations.items()), tested=tested)
+    model = rubric_model(
+        tuple(brought.checks.items()),
+        tuple(brought.simulations.items()),
+        maps=tuple(brought.maps.items()),
+        tested=tested,
+    )
     rubric = _validated(path, tree, model)
     mistakes = [*tree.mistakes, *broken_links(rubric, tree), *simulation_mistakes(rubric, tree)]
     mistakes += _of_tests(rubric, brought, tree)
@@ -456,8 +474,9 @@ def _runs_of_tests(rubric: RubricShape, brought: _Brought, limits: Limits) -> It
         return
     programs = tuple(name for name in rubric.files if not _is_yaml(name))
     text = brought.test_file.content.decode(errors="replace")  # it was parsed
+    own = tuple((name, one.file.name, one.file.content) for name, one in brought.simulations.items())
     for test in brought.tests:
-        run = RubricTest(brought.test_file.name, text, test.name)
+        run = RubricTest(brought.test_file.name, text, test.name, own, tuple(brought.maps.items()))
         # how long it takes is up to the test
         provided = tuple(sorted(brought.provided.items()))
         yield Scenario(test.id, programs, Span(0), limits=limits, provided=provided, test=run)
@@ -470,7 +489,8 @@ def side_files(path: Path) -> tuple[OwnFile, ...]:
     keys = ("checks", "hints", "simulations", "provided", "pytest")
     files = (name for key in keys for name in _own_names(path, tree, key))
     definitions = definition_files(path, _own_names(path, tree, "interfaces"))
-    return (*own_files(path, tuple(files)), *definitions, *bag_files(path, named_bags(tree.data)))
+    maps = map_files(path, _own_names(path, tree, "maps"))
+    return (*own_files(path, tuple(files)), *maps, *definitions, *bag_files(path, named_bags(tree.data)))
 
 
 def own_checks(path: Path) -> Mapping[str, type]:
@@ -496,6 +516,7 @@ _OWN = {
     "simulations": _PYTHON,
     "pytest": _PYTHON,
     "provided": (PROVIDED_FILE, PROVIDED_WORDS),
+    "maps": (MAP_FILE, MAP_WORDS),
     "interfaces": (BESIDE, "a folder beside the rubric such as interfaces"),
 }
 

@@ -28,6 +28,7 @@ from grader.grading.rubrics.types import (
     Id,
     InterfaceFolder,
     LongDuration,
+    MapFile,
     Number,
     Points,
     ProgramName,
@@ -43,7 +44,7 @@ from grader.grading.rubrics.variants import VariantsField
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.scenario import Connection, Span, Stimulus
 from grader.runtime.model.wording import listed
-from grader.runtime.simulation import SIMULATIONS
+from grader.runtime.simulation import SIMULATIONS, WallMap
 from grader.runtime.stimuli import KINDS, ServiceCalls, Simulated
 
 _EVENTS = (DUE_DATE, PUBLISHED)
@@ -232,6 +233,9 @@ class RubricShape(Shape):
     simulations: tuple[CheckFile, ...] = Field(
         default=(), description="Python files with your own simulations, beside the rubric"
     )
+    maps: tuple[MapFile, ...] = Field(
+        default=(), description="maps for simulations as ROS's map_server reads them, beside the rubric"
+    )
     interfaces: tuple[InterfaceFolder, ...] = Field(
         default=(), description="folders beside the rubric with interface packages: msg, srv and action definitions"
     )
@@ -250,9 +254,10 @@ def rubric_model(
     checks: tuple[tuple[str, type], ...],
     simulations: tuple[tuple[str, OwnSimulation], ...] = (),
     *,
+    maps: tuple[tuple[str, WallMap], ...] = (),
     tested: bool = False,
 ) -> type[RubricShape]:
-    """Return the model of a rubric file with these checks and simulations, in the order in which messages list them.
+    """Return the model of a rubric file with these checks, simulations and maps, as messages list them.
 
     One that names tests (`tested`) needs no other criteria.
     """
@@ -261,8 +266,9 @@ def rubric_model(
     parts: dict[str, Any] = {"criteria": (list_of(criterion), () if tested else Field(min_length=1))}
     if tested:
         parts["scenarios"] = (tuple[ScenarioShape, ...], ())
-    if simulations:
-        own = {n: simulation_shape(n, one.kind, one.file.name, one.file.content) for n, one in simulations}
+    if simulations or maps:
+        own = {name: simulation_shape(name, kind, maps=maps) for name, kind in SIMULATIONS.items()} if maps else {}
+        own |= {n: simulation_shape(n, one.kind, one.file.name, one.file.content, maps) for n, one in simulations}
         stimuli = (list_of(_stimulus_model(own)), ())
         scenario = create_model("ScenarioShape", __base__=ScenarioShape, __doc__=ScenarioShape.__doc__, stimuli=stimuli)
         parts["scenarios"] = (list_of(scenario), () if tested else Field(min_length=1))

@@ -77,7 +77,7 @@ def own_files(
             `never_in`, which students write to.
     """
     where = f"{printable(str(rubric), 500)}: {key}:"
-    return tuple(_own_file(rubric, name, never_in, f"{where} {printable(name)}") for name in dict.fromkeys(names))
+    return tuple(beside_file(rubric, name, never_in, f"{where} {printable(name)}") for name in dict.fromkeys(names))
 
 
 def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Path] = ()) -> tuple[OwnFile, ...]:
@@ -94,7 +94,7 @@ def definition_files(rubric: Path, folders: Sequence[str], never_in: Sequence[Pa
             text = f"{where} {printable(folder)}: expected a folder with 1 to {MOST_DEFINITIONS} definitions, found "
             raise RubricError(f"{text}{len(paths) or 'none'}", "a package has its files in folders msg, srv and action")
         names = [path.relative_to(rubric.parent).as_posix() for path in paths]
-        found += [_own_file(rubric, name, never_in, f"{where} {printable(name)}", least=0) for name in names]
+        found += [beside_file(rubric, name, never_in, f"{where} {printable(name)}", least=0) for name in names]
     return tuple(found)
 
 
@@ -112,7 +112,7 @@ def bag_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ())
             text = f"{where}: expected a recording of 1 to {MOST_BAG_FILES} files, found {len(files) or 'none'}"
             raise RubricError(text, "name a rosbag2 folder, or a .mcap or .db3 file")
         parts = [file.relative_to(rubric.parent).as_posix() for file in files]
-        found += [_own_file(rubric, part, never_in, f"{where}", least=0, most=MOST_BAG_BYTES) for part in parts]
+        found += [beside_file(rubric, part, never_in, f"{where}", least=0, most=MOST_BAG_BYTES) for part in parts]
     return tuple(found)
 
 
@@ -227,9 +227,19 @@ def rubric_digest(rubric: bytes, files: Sequence[OwnFile]) -> str:
     return f"sha256:{digest.hexdigest()}"
 
 
-def _own_file(  # noqa: PLR0913  what to read, and its limits
+def beside_file(  # noqa: PLR0913  what to read, and its limits
     rubric: Path, name: str, never_in: Sequence[Path], where: str, least: int = 1, most: int = MAX_BYTES
 ) -> OwnFile:
+    """Return one file; see `own_files`.
+
+    Args:
+        rubric: The rubric.
+        name: Its name relative to the rubric.
+        never_in: Folders that students write to.
+        where: What names it, with which messages begin.
+        least: The least bytes that it may have.
+        most: The most bytes.
+    """
     path = rubric.parent / name
     try:
         real = path.resolve(strict=True)

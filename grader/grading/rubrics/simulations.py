@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import field
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -16,7 +17,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.scenario import Between, Choose, FieldSpec, Stimulus, Written
 from grader.runtime.model.wording import printable
-from grader.runtime.simulation import SHORTEST_PERIOD_NS, Moment, Output, types_heard
+from grader.runtime.simulation import SHORTEST_PERIOD_NS, SIMULATIONS, Moment, Output, RobotInMap, types_heard
 from grader.runtime.simulation.loading import begin_of, guarded, made_simulation
 from grader.runtime.stimuli import Simulated
 
@@ -32,6 +33,7 @@ class Offered:
     hears: Mapping[str, tuple[str, ...]]
     serves: Mapping[str, str]
     outputs: tuple[Output, ...]
+    records: Mapping[str, str] = field(default_factory=dict)  # what is only recorded
 
     @property
     def types(self) -> set[str]:
@@ -43,6 +45,7 @@ class Offered:
         yield from self.publishes.items()
         yield from ((topic, type_) for topic, types in self.hears.items() for type_ in types)
         yield from self.serves.items()
+        yield from self.records.items()
 
 
 def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
@@ -57,29 +60,30 @@ def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
 def offered(simulated: Simulated) -> Offered:
     """Try a simulation with the first value that each parameter may have; raises HarnessError if it fails."""
     parameters = {name: _first(spec) for name, spec in simulated.parameters.items()}
-    one = made_simulation(simulated.name, simulated.path, simulated.content, parameters)
+    one = made_simulation(simulated.name, simulated.path, simulated.content, parameters, dict(simulated.maps))
     call = partial(guarded, simulated.name, simulated.path)
     call(lambda: one.begin(random.Random(0)))  # noqa: S311  the same at each reading
     if not (isinstance(one.period, int) and one.period >= SHORTEST_PERIOD_NS):
         raise HarnessError(
             f"the simulation `{simulated.name}` has a period of {one.period!r} ns, expected at least 1 ms"
         )
-    publishes, hears, serves = (
+    publishes, hears, serves, records = (
         call(lambda method=method: dict(getattr(one, method)()), begin_of(one, method, simulated.path))  # type: ignore[misc]
-        for method in ("publishes", "hears", "serves")
+        for method in ("publishes", "hears", "serves", "records")
     )
     hears = types_heard(hears)
     outputs: list[Output] = []
     for number in range(STEPS):
         now = Moment(number * one.period, number * one.period)
         outputs += call(lambda now=now: list(islice(one.step(now), OUTPUTS)), begin_of(one, "step", simulated.path))  # type: ignore[misc]
-    wrong = [output for output in outputs if not _is_output(output, publishes)]
+    call(lambda: list(one.drawing()), begin_of(one, "drawing", simulated.path))
+    wrong = [output for output in outputs if not _is_output(output, {**publishes, **records})]
     if wrong:
         text = (
             f"the simulation `{simulated.name}` publishes {printable(str(wrong[0]), 80)}, expected one of its topics "
         )
         raise HarnessError(f"{text}({', '.join(publishes) or 'it has none'}) and a mapping of fields")
-    return Offered(publishes, hears, serves, tuple(outputs))
+    return Offered(publishes, hears, serves, tuple(outputs), records)
 
 
 def _first(spec: FieldSpec) -> Any:
@@ -89,6 +93,8 @@ def _first(spec: FieldSpec) -> Any:
         return spec.options[0]
     if isinstance(spec, Written):
         return spec.text.replace("{}", f"{spec.number.low:.{spec.decimals}f}")
+    if isinstance(spec, Mapping):
+        return {name: _first(inner) for name, inner in spec.items()}
     return tuple(map(_first, spec)) if isinstance(spec, tuple) else spec
 
 
@@ -99,7 +105,7 @@ def _is_output(output: object, topics: Mapping[str, str]) -> bool:
 def published_by(stimulus: Stimulus) -> Iterable[str]:
     """Return the topics that a stimulus publishes on; none for a simulation that fails, which another rule tells."""
     if isinstance(stimulus, Simulated):
-        return [topic for one in offered_by([stimulus]) for topic in one.publishes]
+        return [topic for one in offered_by([stimulus]) for topic in (*one.publishes, *one.records)]
     topic = getattr(stimulus, "topic", "")
     return [topic] if topic else []
 
@@ -122,10 +128,23 @@ def simulation_mistakes(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake
         except HarnessError as error:
             yield where.mistake(f"expected a simulation that runs, found that {error.message}")
             continue
-        names, others = {*found.publishes, *found.serves}, taken[int(path[1])]
+        yield from _unknown_maps(simulated, tree, path)
+        names, others = {*found.publishes, *found.serves, *found.records}, taken[int(path[1])]
         for name in sorted(names & others):
             yield where.mistake(f"expected topics and services that no other stimulus has, found `{name}` again")
         others |= names
+
+
+def _unknown_maps(simulated: Simulated, tree: YamlTree, path: TreePath) -> Iterator[Mistake]:
+    """Yield the names of maps that the rubric does not list, of which a seed may draw another one than the first."""
+    kind = SIMULATIONS.get(simulated.name)
+    asked = simulated.parameters.get("map") if kind is not None and issubclass(kind, RobotInMap) else None
+    options = asked.options if isinstance(asked, Choose) else [asked] if asked else []
+    known = dict(simulated.maps)
+    for name in options:
+        if name not in known:
+            text = f"expected a map that the rubric lists under `maps` ({', '.join(known) or 'it lists none'})"
+            yield tree.at((*path, "map")).mistake(f"{text}, found `{printable(str(name))}`")
 
 
 def _names_of_others(scenario: ScenarioShape) -> set[str]:

@@ -210,6 +210,10 @@ InterfaceFolder = Annotated[str, MatchingText(BESIDE, "a folder beside the rubri
 RecordingPath = Annotated[
     str, MatchingText(f"(?:{BESIDE})?", "a recording beside the rubric such as bags/scan", "bags/scan")
 ]
+#: A map as ROS's map_server reads it, under the same rules.
+MAP_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.ya?ml"
+MAP_WORDS = "the YAML file of a map in the rubric's folder such as maps/room.yaml"
+MapFile = Annotated[str, MatchingText(MAP_FILE, MAP_WORDS, "maps/room.yaml")]
 Number = Annotated[Text, BeforeValidator(_as_text)]
 Real = Annotated[float, Strict(), AllowInfNan(allow_inf_nan=False)]
 #: Unlike other numbers, a field may be `.nan` or `.inf`: sensors send them.

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S, Kind, Topic
+from grader.runtime.model.worlds import WallMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,6 +253,9 @@ class RubricTest:
     file: str  # its file, relative to the rubric
     content: str  # the text of the file
     name: str  # what pytest calls it within the file, such as `test_stops[0.5]` or `TestStop::test_wall`
+    # Name, file and its text of each simulation of the rubric's own
+    simulations: tuple[tuple[str, str, bytes], ...] = ()
+    maps: tuple[tuple[str, WallMap], ...] = ()  # the maps of the rubric, by name
 
 
 @dataclass(frozen=True, slots=True)

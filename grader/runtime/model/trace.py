@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds
+from grader.runtime.model.worlds import Sketch
 
 
 class ClockKind(str, Enum):
@@ -405,6 +406,7 @@ class Trace:
     written: tuple[WrittenFile, ...] = ()  # of programs that ended in time
     other_numpy: OtherNumpy | None = None  # what numpy programs run with, if it is not that of the ROS release
     newer: tuple[NewerPython, ...] = ()  # what programs ended of, and would not where the release's own Python runs
+    drawn: tuple[Sketch, ...] = ()  # the pictures of the simulations that took part, as they were at the end
     # What the test has found whose run this is; None for a scenario that checks judge
     tested: Tested | None = None
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)

@@ -34,6 +34,7 @@ from grader.runtime.model.trace import (
     Tested,
     WrittenFile,
 )
+from grader.runtime.model.worlds import Sketch
 from grader.runtime.recording.codec import FORMAT, HEAD, TAGS, trace_to_json
 
 #: Shorter values take less memory as dicts; a longer one may contain a number that no decoder accepts.
@@ -294,7 +295,7 @@ def _tested(row: Any) -> Tested:
 _PARTS: Mapping[Any, tuple[Any, Callable[[Any], Any]]] = {
     Start: (_START, _start),
     Tested: (_TESTED, _tested),
-    **{kind: (_row_of(kind), partial(_same, kind)) for kind in (WrittenFile, NewerPython, OtherNumpy)},
+    **{kind: (_row_of(kind), partial(_same, kind)) for kind in (WrittenFile, NewerPython, OtherNumpy, Sketch)},
 }
 #: The types of the fields of a trace but its observations: memory, the wire and evidence follow from them.
 _HINTS: Mapping[str, Any] = {

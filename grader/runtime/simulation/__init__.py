@@ -6,18 +6,33 @@ A rubric uses one as a stimulus: `simulation: {differential_drive: {x: {between:
 writes another as a class in a file that the rubric lists under `simulations`.
 """
 
-from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Hears, Moment, Output, Simulation, types_heard
-from grader.runtime.simulation.robots import SIMULATIONS, DifferentialDrive, Turtle, Unicycle
+from grader.runtime.model.worlds import Sketch, WallMap
+from grader.runtime.simulation.loading import SIMULATIONS
+from grader.runtime.simulation.mapped import Box, Obstacle, RobotInMap
+from grader.runtime.simulation.participant import (
+    SHORTEST_PERIOD_NS,
+    Hears,
+    Moment,
+    Output,
+    Simulation,
+    types_heard,
+)
+from grader.runtime.simulation.robots import DifferentialDrive, Turtle, Unicycle
 
 __all__ = [
     "SHORTEST_PERIOD_NS",
     "SIMULATIONS",
+    "Box",
     "DifferentialDrive",
     "Hears",
     "Moment",
+    "Obstacle",
     "Output",
+    "RobotInMap",
     "Simulation",
+    "Sketch",
     "Turtle",
     "Unicycle",
+    "WallMap",
     "types_heard",
 ]

@@ -5,16 +5,25 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass
 from types import FrameType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from grader.runtime.model.author_files import AuthorMistake, error_words, line_of, run_author_file
 from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.worlds import WallMap
+from grader.runtime.simulation.mapped import RobotInMap
 from grader.runtime.simulation.participant import Simulation
-from grader.runtime.simulation.robots import SIMULATIONS
+from grader.runtime.simulation.robots import DifferentialDrive, Turtle
 
 Result = TypeVar("Result")
 
+#: The simulations that a rubric may use without a file, by name.
+SIMULATIONS: Mapping[str, type[Simulation]] = {
+    "differential_drive": DifferentialDrive,
+    "robot_in_map": RobotInMap,
+    "turtle": Turtle,
+}
 #: Name of the table in an author's file.
 TABLE = "SIMULATIONS"
 #: Processor time that one call of a simulation may take, in seconds.
@@ -38,7 +47,9 @@ def classes(path: str, content: bytes) -> Any:
     return vars(run_author_file("_own_simulations", path, content)).get(TABLE)
 
 
-def made_simulation(name: str, path: str, content: bytes, parameters: Mapping[str, Any]) -> Simulation:
+def made_simulation(
+    name: str, path: str, content: bytes, parameters: Mapping[str, Any], maps: Mapping[str, WallMap] | None = None
+) -> Simulation:
     """Return a simulation.
 
     Args:
@@ -46,6 +57,7 @@ def made_simulation(name: str, path: str, content: bytes, parameters: Mapping[st
         path: The author's file with its class; empty for a built-in one.
         content: The text of that file.
         parameters: Values of its parameters.
+        maps: The maps that it may use, by name.
 
     Raises:
         HarnessError: The file or the class raises an error.
@@ -53,7 +65,11 @@ def made_simulation(name: str, path: str, content: bytes, parameters: Mapping[st
 
     def make() -> Simulation:
         kind: type[Simulation] = (classes(path, content) if path else SIMULATIONS)[name]
-        return kind(**{key: _as_parameter(value) for key, value in parameters.items()})
+        has_parts = any(isinstance(value, (list, tuple)) for value in parameters.values())
+        hints = get_type_hints(kind) if has_parts else {}
+        made = kind(**{key: _as_parameter(value, hints.get(key)) for key, value in parameters.items()})
+        made.maps = dict(maps or {})
+        return made
 
     return guarded(name, path, make)
 
@@ -101,5 +117,12 @@ def begin_of(simulation: Simulation, method: str, path: str) -> int:
     return code.co_firstlineno if code is not None and code.co_filename == path else 0
 
 
-def _as_parameter(value: Any) -> Any:
-    return tuple(map(_as_parameter, value)) if isinstance(value, list) else value
+def _as_parameter(value: Any, hint: Any) -> Any:
+    """Return the value of a parameter from what a plan holds: lists become tuples, mappings the parts of a tuple."""
+    if isinstance(value, Mapping) and is_dataclass(hint):
+        hints = get_type_hints(hint)
+        return hint(**{key: _as_parameter(inner, hints.get(key)) for key, inner in value.items()})  # type: ignore[operator]
+    if isinstance(value, (list, tuple)):
+        kinds = get_args(hint)
+        return tuple(_as_parameter(inner, kinds[0] if kinds else None) for inner in value)
+    return value

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, seconds
+from grader.runtime.model.worlds import Sketch, WallMap
 
 #: The shortest time between two steps of a simulation: no sensor is faster, and each step takes the grader's time.
 SHORTEST_PERIOD_NS = NS_PER_MS
@@ -45,12 +47,21 @@ class Simulation:
 
     Attributes:
         period: Nanoseconds between two calls of `step`, at least a millisecond; the first call is at the beginning.
+        maps: The maps that the rubric lists under `maps`, by name; there from `begin` on.
     """
 
     period: int = NS_PER_S // 20
+    maps: Mapping[str, WallMap] = MappingProxyType({})
 
     def publishes(self) -> Mapping[str, str]:
         """Return the topics that it publishes on, with their message types."""
+        return {}
+
+    def records(self) -> Mapping[str, str]:
+        """Return the topics that it only records, with their message types: checks read them, and no node hears them.
+
+        `step` and `on_message` give messages on them as on those that it publishes on.
+        """
         return {}
 
     def hears(self) -> Hears:
@@ -88,6 +99,10 @@ class Simulation:
     def on_request(self, now: Moment, service: str, request: Mapping[str, Any]) -> Mapping[str, Any]:
         """Answer a request of a student's client, and return the fields of the response."""
         return {}
+
+    def drawing(self) -> Iterable[Sketch]:
+        """Return a picture of what has happened, seen from above; asked once, at the end of a recording."""
+        return ()
 
 
 def types_heard(hears: Hears) -> dict[str, tuple[str, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from typing import Any
 
@@ -38,13 +38,20 @@ class Unicycle(Simulation):
     turn_rate: float = field(default=0.0, init=False)  # rad/s, counter-clockwise
     _told: tuple[float, float] = field(default=(0.0, 0.0), init=False)
     _told_ns: int | None = field(default=None, init=False)
-    _at_ns: int = field(default=0, init=False)
+    at_ns: int = field(default=0, init=False)  # the time that it has reached
 
     def command(self, now: Moment, twist: Mapping[str, Any]) -> None:
         """Obey the fields of a geometry_msgs/msg/Twist from now on: linear.x in m/s, angular.z in rad/s."""
         self.advance(now)
-        self._told = (_finite(twist["linear"]["x"]), _finite(twist["angular"]["z"]))
-        self._told_ns = now.t_ns
+        self.tell(now.t_ns, self.asked(twist))
+
+    def asked(self, twist: Mapping[str, Any]) -> tuple[float, float]:
+        """Return the speed and the turn rate in the fields of a geometry_msgs/msg/Twist, both finite."""
+        return _finite(twist["linear"]["x"]), _finite(twist["angular"]["z"])
+
+    def tell(self, t_ns: int, told: tuple[float, float]) -> None:
+        """Let it drive at a speed and a turn rate from a time on."""
+        self._told, self._told_ns = told, t_ns
 
     def advance(self, now: Moment) -> None:
         """Move until now."""
@@ -55,14 +62,16 @@ class Unicycle(Simulation):
         self._move_to(now.t_ns)
 
     def _move_to(self, t_ns: int) -> None:
-        dt_s, self._at_ns = seconds(t_ns - self._at_ns), max(t_ns, self._at_ns)
-        if dt_s <= 0:
-            return
-        way, turn = self.follow(*self._told, dt_s), self.turn_rate * dt_s
-        middle = self.heading + turn / 2
-        chord = way if abs(turn) < STRAIGHT else way * math.sin(turn / 2) / (turn / 2)
-        self.place(self.x + chord * math.cos(middle), self.y + chord * math.sin(middle))
-        self.heading = math.remainder(self.heading + turn, math.tau)
+        dt_s, self.at_ns = seconds(t_ns - self.at_ns), max(t_ns, self.at_ns)
+        if dt_s > 0:
+            way = self.follow(*self._told, dt_s)
+            self.move(way, self.turn_rate * dt_s)
+
+    def move(self, way: float, turn: float) -> None:
+        """Drive a way in m, and turn by an angle in rad meanwhile."""
+        x, y, heading = arc(self.x, self.y, self.heading, way, turn)
+        self.place(x, y)
+        self.heading = heading
 
     def obeys_for_ns(self) -> int:
         """Return how long a command lasts, in nanoseconds; 0 for until the next one."""
@@ -138,17 +147,30 @@ class DifferentialDrive(Unicycle):
     def step(self, now: Moment) -> Iterable[Output]:
         """Move, and publish where it is."""
         self.advance(now)
-        x, y = (value + (self._draw.gauss(0.0, self.noise) if self.noise else 0.0) for value in (self.x, self.y))
-        turned = {"z": math.sin(self.heading / 2), "w": math.cos(self.heading / 2)}
+        yield from self.told(now, self.x, self.y, self.heading)
+
+    def told(self, now: Moment, x: float, y: float, heading: float) -> Iterator[Output]:
+        """Yield the odometry of a pose with noise, in m and rad, and perhaps the transform."""
+        x, y = (value + (self._draw.gauss(0.0, self.noise) if self.noise else 0.0) for value in (x, y))
+        fields = self.odometry_fields(now, x, y, heading)
+        yield self.odometry, fields
+        if self.transforms:
+            transform = {"translation": {"x": x, "y": y}, "rotation": fields["pose"]["pose"]["orientation"]}
+            one = {"header": fields["header"], "child_frame_id": self.child_frame, "transform": transform}
+            yield "/tf", {"transforms": [one]}
+
+    def odometry_fields(self, now: Moment, x: float, y: float, heading: float) -> Mapping[str, Any]:
+        """Return the fields of nav_msgs/msg/Odometry for a pose in m and rad."""
+        turned = {"z": math.sin(heading / 2), "w": math.cos(heading / 2)}
         header = {"stamp": now.stamp, "frame_id": self.frame}
         pose = {"position": {"x": x, "y": y}, "orientation": turned}
         twist = {"linear": {"x": self.speed}, "angular": {"z": self.turn_rate}}
-        told = {"header": header, "child_frame_id": self.child_frame, "pose": {"pose": pose}, "twist": {"twist": twist}}
-        yield self.odometry, told
-        if self.transforms:
-            transform = {"translation": {"x": x, "y": y}, "rotation": turned}
-            one = {"header": header, "child_frame_id": self.child_frame, "transform": transform}
-            yield "/tf", {"transforms": [one]}
+        return {
+            "header": header,
+            "child_frame_id": self.child_frame,
+            "pose": {"pose": pose},
+            "twist": {"twist": twist},
+        }
 
     def on_message(self, now: Moment, topic: str, message: Mapping[str, Any]) -> Iterable[Output]:
         """Obey a command."""
@@ -162,11 +184,11 @@ class DifferentialDrive(Unicycle):
 
     def follow(self, speed: float, turn_rate: float, dt_s: float) -> float:
         """Take up the commanded speeds within the robot's limits, and return the distance driven in a time."""
-        before, wanted = self.speed, _within(speed, self.max_speed)
+        before, wanted = self.speed, nearest_within(speed, self.max_speed)
         if not self.max_acceleration > 0:
-            return super().follow(wanted, _within(turn_rate, self.max_turn_rate), dt_s)
-        after = before + _within(wanted - before, self.max_acceleration * dt_s)
-        super().follow(after, _within(turn_rate, self.max_turn_rate), dt_s)
+            return super().follow(wanted, nearest_within(turn_rate, self.max_turn_rate), dt_s)
+        after = before + nearest_within(wanted - before, self.max_acceleration * dt_s)
+        super().follow(after, nearest_within(turn_rate, self.max_turn_rate), dt_s)
         return (before + after) / 2 * dt_s
 
 
@@ -243,13 +265,17 @@ class Turtle(Unicycle):
         self.x, self.y = min(max(x, 0.0), FIELD), min(max(y, 0.0), FIELD)
 
 
-#: The simulations that a rubric may use without a file, by name.
-SIMULATIONS: Mapping[str, type[Simulation]] = {"differential_drive": DifferentialDrive, "turtle": Turtle}
-
-
 def _finite(value: float) -> float:
-    return _within(float(value), LARGEST) if math.isfinite(value) else 0.0
+    return nearest_within(float(value), LARGEST) if math.isfinite(value) else 0.0
 
 
-def _within(value: float, most: float) -> float:
+def nearest_within(value: float, most: float) -> float:
+    """Return the number nearest to a value that is not beyond a limit on either side."""
     return min(max(value, -most), most)
+
+
+def arc(x: float, y: float, heading: float, way: float, turn: float) -> tuple[float, float, float]:
+    """Return the pose after an arc of a circle, in m and rad; see `Unicycle`."""
+    middle = heading + turn / 2
+    chord = way if abs(turn) < STRAIGHT else way * math.sin(turn / 2) / (turn / 2)
+    return x + chord * math.cos(middle), y + chord * math.sin(middle), math.remainder(heading + turn, math.tau)

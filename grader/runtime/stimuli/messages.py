@@ -83,6 +83,7 @@ class PublishFields(TopicEvent):
 
     stream: PlannedMessages
     fields: Mapping[str, Any]
+    message: Any = field(default=None, compare=False)  # made of these fields; None if it has not been made yet
 
 
 @dataclass(frozen=True, slots=True)

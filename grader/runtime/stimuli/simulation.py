@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Event, Fields, Planned, Stimulus
+from grader.runtime.model.worlds import WallMap
 from grader.runtime.stimuli.drawing import Draws, drawn_fields, planned_as
 
 
@@ -20,6 +21,7 @@ class PlannedSimulation(Planned):
     content: bytes
     parameters: Mapping[str, Any]
     seed: int
+    maps: tuple[tuple[str, WallMap], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +29,15 @@ class Step(Event):
     """Let time pass for the simulation with a number."""
 
     number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Record(Event):
+    """Record a message that no node hears, as if it had been published."""
+
+    topic: str
+    type: str
+    message: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +55,7 @@ class Simulated(Stimulus):
     path: str = ""  # the author's file with its class, for messages; empty for a built-in one
     content: bytes = b""  # the text of that file
     start_ns: int = 0
+    maps: tuple[tuple[str, WallMap], ...] = ()  # the maps of the rubric, by name
 
     def planned(self, draws: Draws) -> PlannedSimulation:
         """Draw every parameter, and the seed of the noise."""

@@ -120,7 +120,11 @@ def collected_tests(test: RubricTest, paths: Sequence[str] = ()) -> tuple[list[s
 
 def _mistake_in(line: Mapping[str, Any], test: RubricTest) -> AuthorMistake | None:
     told = line.get("mistake")
-    return None if told is None else AuthorMistake(test.file, int(told["line"]), str(told["text"]))
+    return (
+        None
+        if told is None
+        else AuthorMistake(str(told.get("file") or test.file), int(told["line"]), str(told["text"]))
+    )
 
 
 def _ended(test: RubricTest, what: str) -> AuthorMistake:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from grader.runtime.host.protocol import Claim, ThreadFault
 from grader.runtime.message_classes import plain_fields
 from grader.runtime.model.scenario import Event
-from grader.runtime.model.trace import AssessedTrace, ClockKind, Mark, Observation, Offer
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Delivery, Mark, Observation, Offer
 from grader.runtime.plan import Plan
 from grader.runtime.served_actions import PARTS_OF_ACTIONS, TOPICS_OF_ACTIONS, ServedAction, planned_action
 from grader.runtime.simulation.participant import Moment
@@ -19,7 +19,7 @@ from grader.runtime.stimuli.calls import AddClients, Ask, PlannedCalls
 from grader.runtime.stimuli.events import Disappear, TopicEvent, events_in_order
 from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
 from grader.runtime.stimuli.server import AddServer, PlannedServer, RemoveServer, Respond
-from grader.runtime.stimuli.simulation import Step
+from grader.runtime.stimuli.simulation import Record, Step
 from grader.runtime.worker.core import Agenda, Taken
 from grader.runtime.worker.ending import never_stopped, reported_fault
 from grader.runtime.worker.observer import Observer
@@ -101,6 +101,7 @@ class Runner(ABC):
             harness_problem=self._graders_fault() or self._harness_problem(),
             incomplete=self._is_incomplete(),
             may_drift=self._may_drift(),
+            drawn=self._simulations.drawn(),
         )
 
     @abstractmethod
@@ -242,6 +243,8 @@ class Runner(ABC):
             for message in published:
                 self._send(message, now_ns)
             self._agenda.later(following)
+        elif isinstance(event, Record):
+            self._recorder.add(Delivery(now_ns, event.topic, event.type, plain_fields(event.message)))
         elif isinstance(event, AddAction):
             self._actions[event.server.action] = planned_action(event.server)
             self._offer_action(event.server.action, event.server.type, now_ns)

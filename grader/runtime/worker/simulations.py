@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,18 +16,21 @@ from grader.runtime.message_classes import built, wanted_class
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.scenario import Event
+from grader.runtime.model.worlds import TONES, Sketch
 from grader.runtime.plan import Plan
 from grader.runtime.simulation.loading import SimulationError, begin_of, guarded, made_simulation
 from grader.runtime.simulation.participant import SHORTEST_PERIOD_NS, Moment, Output, Simulation, types_heard
 from grader.runtime.stimuli.messages import Advertise, PlannedMessages, PublishFields
 from grader.runtime.stimuli.server import AddServer, PlannedServer
-from grader.runtime.stimuli.simulation import PlannedSimulation, Step
+from grader.runtime.stimuli.simulation import PlannedSimulation, Record, Step
 from grader.runtime.worker.core import Taken
 
 Result = TypeVar("Result")
 
 #: The most messages that a simulation may publish in one call: an author's loop without an end stops here.
 OUTPUTS = 100
+#: The most things in a picture, and points of one.
+SKETCHES, POINTS = 50, 20_000
 #: How many times as many messages as a student's node a simulation may publish: it may react to several topics.
 BEYOND = 5
 
@@ -89,6 +93,10 @@ class Simulations:
         one = next((one for one in self._all if service in one.serves), None)
         return None if one is None else one.answer(service, request, self._after(now))
 
+    def drawn(self) -> tuple[Sketch, ...]:
+        """Return the picture of each simulation, as it is now."""
+        return tuple(sketch for one in self._all for sketch in one.drawn())
+
     def _after(self, now: Moment) -> Moment:
         """Return a moment that does not lie before an earlier one: a late step on the wall clock has its due time."""
         self._last_ns = max(self._last_ns, now.t_ns)
@@ -101,7 +109,9 @@ class _Running:
     def __init__(self, planned: PlannedSimulation, most: int, begun: Simulation | None = None) -> None:
         self._planned = planned
         self._left = most
-        self.simulation = begun or made_simulation(planned.name, planned.path, planned.content, planned.parameters)
+        self.simulation = begun or made_simulation(
+            planned.name, planned.path, planned.content, planned.parameters, dict(planned.maps)
+        )
         self.period_ns = max(SHORTEST_PERIOD_NS, self.simulation.period)
         self.hears = self._call(lambda: types_heard(self.simulation.hears()), "hears")
         self.serves = self._call(lambda: dict(self.simulation.serves()), "serves")
@@ -109,9 +119,14 @@ class _Running:
             topic: PlannedMessages(topic, type_, 0, 0, self.period_ns, 0, best_effort=False, latched=False, values=())
             for topic, type_ in self._call(lambda: dict(self.simulation.publishes()), "publishes").items()
         }
-        with self._blamed("publishes"):
-            for stream in self._streams.values():
-                wanted_class(stream.type, "msg", stream.topic)
+        self._classes: dict[str, Any] = {}
+        self._records = self._call(lambda: dict(self.simulation.records()), "records")
+        for method, types in (
+            ("publishes", {s.topic: s.type for s in self._streams.values()}),
+            ("records", self._records),
+        ):
+            with self._blamed(method):
+                self._classes |= {topic: wanted_class(type_, "msg", topic) for topic, type_ in types.items()}
         with self._blamed("serves"):
             for service, type_ in self.serves.items():
                 wanted_class(type_, "srv", service)
@@ -125,6 +140,11 @@ class _Running:
         for service, type_ in self.serves.items():
             server = PlannedServer(service, type_, now_ns, 0, 0, cycle=False, answers=0, responses=())
             yield AddServer(now_ns, server)
+
+    def drawn(self) -> tuple[Sketch, ...]:
+        sketches = self._call(lambda: list(islice(self.simulation.drawing(), SKETCHES)), "drawing")
+        with self._blamed("drawing"):
+            return tuple(map(_checked_sketch, sketches))
 
     def publish(self, method: str, work: Callable[[Moment], Iterable[Output]], now: Moment) -> list[Event]:
         outputs = self._call(lambda: list(islice(work(now), OUTPUTS + 1)), method)
@@ -143,10 +163,10 @@ class _Running:
             built(wanted_class(self.serves[service], "srv", service).Response, fields, service)
         return fields
 
-    def _published(self, output: Output, now: Moment) -> PublishFields:
+    def _published(self, output: Output, now: Moment) -> PublishFields | Record:
         try:
             topic, fields = output
-            stream = self._streams[topic]
+            stream = None if topic in self._records else self._streams[topic]
         except (TypeError, ValueError, KeyError):
             text = f"a topic that it publishes on ({', '.join(self._streams) or 'none'}) with the fields of a message"
             raise HarnessError(f"expected {text}, found {str(output)[:80]!r}") from None
@@ -155,8 +175,10 @@ class _Running:
             raise HarnessError("expected fewer messages in one recording")
         if not isinstance(fields, Mapping):
             raise HarnessError(f"expected a mapping of fields for {topic}, found {str(fields)[:80]!r}")
-        built(wanted_class(stream.type, "msg", topic), fields, topic)  # now, while it is known which method gave them
-        return PublishFields(now.t_ns, topic, stream, fields)
+        message = built(self._classes[topic], fields, topic)  # now, while it is known which method gave them
+        if stream is None:
+            return Record(now.t_ns, topic, self._records[topic], message)
+        return PublishFields(now.t_ns, topic, stream, fields, message)
 
     @contextmanager
     def _blamed(self, method: str) -> Iterator[None]:
@@ -174,3 +196,20 @@ class _Running:
     def _call(self, work: Callable[[], Result], method: str) -> Result:
         path = self._planned.path
         return guarded(self._planned.name, path, work, begin_of(self.simulation, method, path))
+
+
+def _checked_sketch(sketch: object) -> Sketch:
+    """Return a thing of a picture with plain numbers; raises HarnessError for what no picture can hold."""
+    if not isinstance(sketch, Sketch):
+        raise HarnessError(f"expected a Sketch, found {str(sketch)[:80]!r}")
+    try:
+        lines = tuple(tuple((float(x), float(y)) for x, y in line) for line in sketch.lines)
+    except (TypeError, ValueError, OverflowError):
+        raise HarnessError(
+            f"expected lines of points (x, y) in the sketch {sketch.name!r}, found something else"
+        ) from None
+    if not (isinstance(sketch.name, str) and sketch.tone in TONES):
+        raise HarnessError(f"expected a name and one of the tones {', '.join(TONES)}, found {str(sketch.tone)[:80]!r}")
+    if sum(map(len, lines)) > POINTS or not all(math.isfinite(n) for line in lines for point in line for n in point):
+        raise HarnessError(f"expected at most {POINTS:,} finite points in the sketch {sketch.name!r}, found others")
+    return Sketch(sketch.name[:100], lines, bool(sketch.dots), sketch.tone)

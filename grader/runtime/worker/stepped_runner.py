@@ -333,6 +333,9 @@ class _Elsewhere(Simulation):
     def publishes(self) -> Mapping[str, str]:
         return self._command.publishes
 
+    def records(self) -> Mapping[str, str]:
+        return self._command.records
+
     def hears(self) -> Mapping[str, tuple[str, ...]]:
         return self._command.hears
 

@@ -49,7 +49,9 @@ class TopicPeers(ABC):
         elif isinstance(event, PublishRecorded):
             self._publish(Delivery(now_ns, topic, self._streams[topic], event.value, event.cdr), event.cdr)
         elif isinstance(event, PublishFields):
-            message = built(message_class(event.stream.type), event.fields, topic)
+            message = event.message
+            if message is None:
+                message = built(message_class(event.stream.type), event.fields, topic)
             self._publish(Delivery(now_ns, topic, event.stream.type, plain_fields(message)), message)
         elif isinstance(event, Disappear):
             self._streams.pop(topic, None)

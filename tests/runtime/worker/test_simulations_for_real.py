@@ -10,6 +10,7 @@ from tiers import each
 
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.start import grade_once
+from grader.grading.model.chart import Chart, Playback
 from grader.grading.model.exercise import Outcome
 
 pytestmark = pytest.mark.ros
@@ -216,3 +217,69 @@ def test_a_node_that_floods_a_simulation_is_at_fault_itself(tmp_path: Path) -> N
     assert report.final
     assert found.outcome is Outcome.NOT_MET
     assert "messages" in found.reason
+
+
+ROOM = """\
+schema: grader/rubric/v1
+exercise: {id: follow, number: "1", title: Follow}
+files: [follow.py]
+maps: [room.yaml]
+scenarios:
+  - id: alone
+    processes: [follow.py]
+    observe: {duration: 4 s}
+    stimuli:
+      - simulation: {robot_in_map: {map: room.yaml, x: {between: [-0.5, 0.5]}, dust: 0.1, dropped: 0.1}}
+criteria:
+  - id: hits
+    title: Drives against the wall
+    points: 1
+    scenario: alone
+    check: {stays_in_range: {topic: /truth/collisions, field: data, low: 1, after: 3 s}}
+  - {id: lives, title: Lives, points: 1, scenario: alone, check: {no_fault: {}}}
+"""
+DRIVER = """\
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+from sensor_msgs.msg import LaserScan
+
+rclpy.init()
+node = Node("follow")
+commands = node.create_publisher(Twist, "/cmd_vel", 10)
+
+
+def on_scan(scan):
+    names = [name for name, _ in node.get_topic_names_and_types()]
+    node.get_logger().info(f"{len(scan.ranges)} ranges, truth: {any('truth' in name for name in names)}")
+    command = Twist()
+    command.linear.x = 1.0
+    commands.publish(command)
+
+
+node.create_subscription(LaserScan, "/scan", on_scan, 10)
+rclpy.spin(node)
+"""
+
+
+def test_a_robot_in_a_map_is_recorded_with_what_no_node_hears(tmp_path: Path) -> None:
+    """The same twice, with its picture, which the page of the report shows with the same scale on both axes."""
+    (tmp_path / "student").mkdir()
+    (tmp_path / "student" / "follow.py").write_text(DRIVER, encoding="utf-8")
+    (tmp_path / "follow.yaml").write_text(ROOM, encoding="utf-8")
+    (tmp_path / "room.yaml").write_text("image: room.pgm\nresolution: 0.1\norigin: [-2, -2, 0]\n", encoding="utf-8")
+    walls = "0 " * 40 + ("0 " + "1 " * 38 + "0 ") * 38 + "0 " * 40
+    (tmp_path / "room.pgm").write_text(f"P2 40 40 1 {walls}", encoding="utf-8")
+    asked = GradeRequest(str(tmp_path / "student"), rubrics=(tmp_path / "follow.yaml",), clock="virtual", seed=5)
+    first, second = (grade_once(asked, lambda _: None, pictures=True) for _ in range(2))
+    assert {id_: verdict.outcome for id_, verdict in verdicts(first).items()} == dict.fromkeys(
+        ("hits", "lives"), Outcome.MET
+    )
+    assert first.exercises[0].verdicts == second.exercises[0].verdicts
+    assert first.exercises[0].figures == second.exercises[0].figures
+    picture = next(f for f in first.exercises[0].figures if isinstance(f, Chart) and f.title == "Seen from above")
+    assert picture.square
+    assert [row.name for row in picture.panels[0].series] == ["walls", "way of the robot", "start", "collisions"]
+    run = next(f for f in first.exercises[0].figures if isinstance(f, Playback))
+    logged = {text for row in run.timeline.panels[0].series for text in row.texts}
+    assert logged == {"360 ranges, truth: False"}
