@@ -125,9 +125,11 @@ class Walls:
         half = np.arctan2(HALF_DIAGONAL, np.sqrt(np.where(inside, 0.0, squares - HALF_DIAGONAL**2)))
         half[inside] = math.pi
         middle = np.mod(np.arctan2(to_y, to_x) - rays.first, math.tau)
-        over = np.nonzero(middle + half >= math.tau)[0]  # these are also a little before the first ray
-        cells = np.concatenate([np.arange(middle.size), over])
-        middle, half = np.concatenate([middle, middle[over] - math.tau]), np.concatenate([half, half[over]])
+        # of a whole turn, some cells lie at its end and at its beginning
+        over, under = np.nonzero(middle + half >= math.tau)[0], np.nonzero(middle < half)[0]
+        cells = np.concatenate([np.arange(middle.size), over, under])
+        middle = np.concatenate([middle, middle[over] - math.tau, middle[under] + math.tau])
+        half = half[cells]
         first = np.maximum(np.floor((middle - half) / rays.increment), 0).astype(np.int64)
         last = np.minimum(np.ceil((middle + half) / rays.increment), rays.count - 1).astype(np.int64)
         counts = np.maximum(last - first + 1, 0)
@@ -209,7 +211,7 @@ def _inverse(part: Numbers) -> Numbers:
     """Return how far a ray goes while it goes 1 m along an axis; a large number for one that does not, never -0.0."""
     import numpy as np  # noqa: PLC0415 - see the top
 
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return np.clip(1.0 / (part + 0.0), -STEEP, STEEP)
 
 

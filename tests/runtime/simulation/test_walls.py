@@ -72,6 +72,21 @@ def test_a_ray_ends_at_the_first_wall(
     assert wrong <= 2
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.05, -0.05])
+def test_all_rays_meet_a_cell_at_the_seam_of_a_turn(turn: float) -> None:
+    """It lies where the first ray and the last one are next to each other."""
+    rays = Rays(turn, -math.pi, math.tau / 360, 360)
+    found = walls_of({(2, 5)}).ranges(1.05, 0.05, rays, 5.0)
+    want = [slowly(1.05, 0.05, turn - math.pi + k * math.tau / 360, limits((2, 5))) for k in range(360)]
+    assert list(found) == pytest.approx(want)
+    assert sum(map(math.isfinite, want)) > 2
+
+
+def test_a_scanner_in_a_wall_measures_nothing() -> None:
+    """In any direction."""
+    assert list(walls_of({(10, 5)}).ranges(0.05, 0.05, Rays(1.0, -math.pi, 0.1, 63), 5.0)) == [0.0] * 63
+
+
 @given(st.integers(0, 1000), st.floats(-1.6, 2.6), st.floats(-1.1, 2.1))
 def test_the_distance_is_that_of_the_nearest_cell(seed: int, x: float, y: float) -> None:
     """From its edge, and 0 inside."""
