@@ -19,12 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from grader import pytest_races
+
 if TYPE_CHECKING:
     from grader.world.opening import Worlds
     from grader.world.world import World
 
 #: What `@pytest.mark.ros` takes.
-_OPTIONS = ("clock", "seed", "seeds", "delay", "lose")
+_OPTIONS = ("clock", "seed", "seeds", "delay", "lose", "between")
 #: The clocks that a test may run on.
 _CLOCKS = ("virtual", "wall")
 #: Where the grader's own code lies, which the traceback of a failure leaves out.
@@ -50,7 +52,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--ros-seed",
         type=int,
         metavar="N",
-        help="draw from this seed the order of programs and callbacks that are ready at one instant, delays and losses",
+        help="draw from this seed the order of programs and callbacks that are ready at one instant, and the faults",
+    )
+    group.addoption(
+        "--ros-no-shrink",
+        action="store_true",
+        help="do not run a test that has failed with a seed again to find out which of its draws it needs",
     )
     group.addoption(
         "--ros-update",
@@ -75,15 +82,19 @@ def pytest_configure(config: pytest.Config) -> None:
     """Describe the marker."""
     config.addinivalue_line(
         "markers",
-        "ros(clock='virtual' or 'wall', seed=N, seeds=COUNT, delay={topic: (least, most)}, lose={topic: share}): "
-        "options of the fixture `ros`: the clock, the seed of everything drawn, the number of seeds to run the test "
-        "with, seconds that messages of the test are on their way, and the share of them that is lost",
+        "ros(clock='virtual' or 'wall', seed=N, seeds=COUNT, delay={topic: (least, most)}, lose={topic: share}, "
+        "between={topic or program: faults}): options of the fixture `ros`: the clock, the seed of everything drawn, "
+        "the number of seeds to run the test with, seconds that messages of the test are on their way, the share of "
+        "them that is lost, and the same between programs, which can also be paused and killed",
     )
     config.addinivalue_line(
         "markers",
         "points(N, hint=TEXT, needs=ID): what the test is worth where a rubric names its file; it does nothing here",
     )
 
+    config.pluginmanager.register(pytest_races)
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(pytest_races.KeepsSeeds(config))
     finder = _Finder(config.rootpath)
     sys.meta_path.append(finder)
     sys.meta_path.insert(0, _BeforeFolders(finder))
@@ -184,7 +195,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     chosen = metafunc.config.getoption("--ros-seed")
     # on the wall clock one run stands for all: there is no order that a seed could draw
     if seeds is not None and chosen is None and _clock(metafunc.config, options) == "virtual":
-        metafunc.parametrize("_ros_seed", range(seeds), ids=[f"seed{number}" for number in range(seeds)])
+        numbers = pytest_races.seeds_in_order(metafunc.config, metafunc.definition.nodeid, seeds)
+        metafunc.parametrize("_ros_seed", numbers, ids=[f"seed{number}" for number in numbers])
 
 
 @pytest.fixture(scope="session")
@@ -261,15 +273,21 @@ def ros(
     tmp_path: Path,
 ) -> Iterator[World]:
     """A world of its own for a test: real nodes, real messages, virtual time."""
+    from grader.world.faults import ALL  # noqa: PLC0415 - no other test waits for it
+
     del tmp_path  # what a failing test leaves lies there
     options = _options(request.node)
+    drawn = request.node.stash.get(pytest_races.DRAWN, None) or ALL
     opened = ros_session.open(
         request.path.parent,
         clock=_clock(request.config, options),
-        seed=_ros_seed,
+        seed=_ros_seed if drawn.seed is None else drawn.seed,
         name=request.node.name,
         delay=options.get("delay"),
         lose=options.get("lose"),
+        between=options.get("between"),
+        swarm=options.get("seeds") is not None,
+        only=drawn,
     )
     with opened as world:
         request.node.stash[_WORLD] = world
@@ -292,11 +310,18 @@ def pytest_runtest_makereport(
         call.excinfo = pytest.ExceptionInfo.from_exception(_of_test(call.excinfo.value, item.path))
     report = yield
     world = item.stash.get(_WORLD, None)
+    if world is not None and call.when == "call" and world.is_drawn and world.repeats:
+        vars(report)[pytest_races.SEED] = world.seed
+        item.stash[pytest_races.ATTEMPT] = pytest_races.rerun_of(item, world, failed=report.failed)
+    if item.stash.get(pytest_races.TRIAL, False):
+        if world is not None and call.when == "call" and report.failed:
+            del item.stash[_WORLD]
+        return report
     if world is not None and call.when == "call" and report.failed and call.excinfo is not None:
         del item.stash[_WORLD]  # the fixture has nothing to add
         repeating = "repeat it with" if world.repeats else "the same delays and losses are drawn with"
         drawn = [f"seed {world.seed}: {repeating} --ros-seed {world.seed}"] if world.is_drawn else []
-        lines = [*drawn, *world.remarks, *_kept(item, world, call.excinfo)]
+        lines = [*item.stash.get(pytest_races.TOLD, []), *drawn, *world.remarks, *_kept(item, world, call.excinfo)]
         report.sections.append(("ros", "\n".join(lines)))
         item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
     return report
@@ -319,12 +344,32 @@ def _of_test(error: BaseException, path: Path) -> BaseException:
     return error.with_traceback(found)
 
 
+def _seed_options(world: World) -> list[str]:
+    """Return the options of pytest with which a run of a world is repeated."""
+    return ["--ros-seed", str(world.seed)] if world.is_drawn else []
+
+
 def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException]) -> Iterator[str]:
     """Close the world of a failed test, and yield what is kept of it."""
-    why = failure.exconly(tryshort=True).splitlines()[0]
+    from grader.world.keeping import keep_failure  # noqa: PLC0415 - takes long, and most tests pass
+
+    why, folder = failure.exconly(tryshort=True).splitlines()[0], item.funcargs["tmp_path"]
+    crash = failure.getrepr(style="short").reprcrash
     try:
+        situation = world.situation()
         world.close()
-        yield from map(str, world.keep(item.funcargs["tmp_path"], why))
+        kept = world.keep(folder, why)
+        facts = {
+            "test": item.nodeid,
+            "error": {"type": failure.typename, "message": str(failure.value)},
+            "place": {"file": "" if crash is None else crash.path, "line": 0 if crash is None else crash.lineno},
+            "race": item.stash.get(pytest_races.TOLD, []),
+            "remarks": world.remarks,
+            **situation,
+            "repeat": ["pytest", item.nodeid.partition("[seed")[0], *_seed_options(world)],
+            "files": list(map(str, kept)),
+        }
+        yield from map(str, [*kept, keep_failure(folder, facts)])
     except Exception as error:  # the failure of the test is what counts
         yield f"the recording was not kept: {type(error).__name__}: {error}"
 

@@ -32,6 +32,33 @@ Kind = TypeVar("Kind", bound=Planned)
 
 
 @dataclass(frozen=True, slots=True)
+class InjectedFault:
+    """What is done to the programs of a stepped run, or to what they send each other.
+
+    Attributes:
+        kind: `delay` or `lose`, of what programs publish on a topic and another one receives; `pause` or `kill`, of a
+            program.
+        on: The topic, or the name of the program.
+        least_ns: The least time: on the way, of the pause, or from the start of the run until the program is killed.
+        most_ns: The most.
+        share: The share of messages that are lost.
+        seed: Hex; what is drawn in the run follows from it.
+    """
+
+    kind: str
+    on: str
+    least_ns: int
+    most_ns: int
+    share: float
+    seed: str
+
+    @property
+    def name(self) -> str:
+        """What tells it from the other faults of a run."""
+        return f"{self.kind} {self.on}"
+
+
+@dataclass(frozen=True, slots=True)
 class PlannedConnection:
     """What happens to the messages of stimuli on a topic, on their way to the processes.
 
@@ -138,6 +165,8 @@ class Plan:
             `measure_lines` in the host.
         debugger: Where a debugger of the programs is, as JSON; then nothing ends a program that does not go on. Empty
             without a debugger. See `let_stop` in the host.
+        faults: What is done to the programs of a stepped run, and to what they send each other.
+        drawn_steps: The steps in which the order is drawn, by their names; None for all of them.
     """
 
     scenario: str
@@ -169,6 +198,8 @@ class Plan:
     working: str = ""
     environment: tuple[tuple[str, str], ...] = ()
     connections: tuple[PlannedConnection, ...] = ()
+    faults: tuple[InjectedFault, ...] = ()
+    drawn_steps: tuple[str, ...] | None = None
     begins: tuple[tuple[str, Beginning], ...] = ()
     measured: str = ""
     debugger: str = ""

@@ -133,6 +133,11 @@ class Kill:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadSteps:
+    """Tell what each program has done in each of its steps, in order."""
+
+
+@dataclass(frozen=True, slots=True)
 class Finish:
     """End the run with all its processes."""
 
@@ -148,6 +153,7 @@ Command = (
     | Simulate
     | Interrupt
     | Kill
+    | ReadSteps
     | Finish
 )
 #: Each command by its name on the wire.

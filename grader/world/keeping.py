@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from grader.grading.app.grade import environment_of
 from grader.grading.judging.figures import playback
+from grader.grading.reporting.escape import json_value
 from grader.grading.reporting.html.render import render_run
 from grader.runtime.files import write_whole
 from grader.runtime.model.trace import AssessedTrace, Delivery, Fault, LogRecord, Message, Observation, OutputLine
@@ -17,7 +20,9 @@ from grader.runtime.session import RecordingSession
 
 #: Who published on a topic, in the words of a test.
 SENDERS = {"grader": "test", "student": "program"}
-RECORDING, PAGE = "recording.mcap", "run.html"
+RECORDING, PAGE, FAILURE = "recording.mcap", "run.html", "failure.json"
+#: What `failure.json` is written in; `failure.schema.json` beside this module describes it.
+FORMAT = "grader/failed-test/v1"
 
 
 def keep(session: RecordingSession, trace: AssessedTrace, seed: int | None, folder: Path, why: str) -> list[Path]:
@@ -41,6 +46,13 @@ def keep(session: RecordingSession, trace: AssessedTrace, seed: int | None, fold
     for name, data in ((RECORDING, recording), (PAGE, page.encode())):
         write_whole(folder / name, data)
     return [folder / RECORDING, folder / PAGE]
+
+
+def keep_failure(folder: Path, facts: Mapping[str, Any]) -> Path:
+    """Write what is known of a failed test as JSON into a folder, and return its path."""
+    data = json_value({"schema": FORMAT, **facts})
+    write_whole(folder / FAILURE, json.dumps(data, indent=2, allow_nan=False).encode() + b"\n")
+    return folder / FAILURE
 
 
 def page_of(session: RecordingSession, trace: AssessedTrace, seed: int | None, why: str = "") -> str:

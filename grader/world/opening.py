@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
 from grader.runtime.session import OWN_PROGRAMS, RecordingSession, open_session, runs_a_test
+from grader.world.faults import ALL, RunDraws
 from grader.world.measuring import measured_lines
 from grader.world.world import World
 
@@ -46,6 +48,9 @@ class Worlds:
         name: str = "test",
         delay: Mapping[str, tuple[float, float]] | None = None,
         lose: Mapping[str, float] | None = None,
+        between: Mapping[str, Mapping[str, Any]] | None = None,
+        swarm: bool = False,
+        only: RunDraws = ALL,
     ) -> Iterator[World]:
         """Open a world, and end all of its programs at the end of the block.
 
@@ -58,12 +63,16 @@ class Worlds:
             delay: For topics that are published on from outside, the least and the most seconds that a message is on
                 its way.
             lose: For such topics, the share of messages that are lost, from 0 to 1.
+            between: For topics and programs, what is done to them; as for the marker `ros` of pytest.
+            swarm: Whether the seed also draws which of these faults are on.
+            only: What is drawn at all, of all that the seed draws.
         """
         folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
-        drawn = {"drawn_order": seed is not None, "delay": delay, "lose": lose}
-        watched = {"measured": self.measured, "debugger": self.debugger}
-        options = {**drawn, **watched}
-        world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **options)  # type: ignore[arg-type]
+        drawn: dict[str, Any] = {"drawn_order": seed is not None, "swarm": swarm, "only": only}
+        faults: dict[str, Any] = {"delay": delay, "lose": lose, "between": between}
+        watched: dict[str, Any] = {"measured": self.measured, "debugger": self.debugger}
+        options = {**drawn, **faults, **watched}
+        world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **options)
         world.updates_recordings = self.updates_recordings
         try:
             yield world
@@ -92,13 +101,14 @@ def open_worlds(folder: Path, *, measured: str = "", debugger: str = "", own_net
 
 
 @contextmanager
-def open_world(
+def open_world(  # noqa: PLR0913 - the options of the marker
     near: Path | str = "",
     *,
     clock: str = "virtual",
     seed: int | None = None,
     delay: Mapping[str, tuple[float, float]] | None = None,
     lose: Mapping[str, float] | None = None,
+    between: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Iterator[World]:
     """Run programs step by step without pytest: in a script, or in the cells of a notebook.
 
@@ -111,12 +121,13 @@ def open_world(
             None for the order in which programs were started, and that of rclpy.
         delay: As for the marker `ros` of pytest.
         lose: As for the marker `ros` of pytest.
+        between: As for the marker `ros` of pytest.
 
     Raises:
         EnvironmentFault: This machine lacks ROS.
     """
     with (
         open_worlds(Path(), measured=measured_lines(Path.cwd())) as worlds,
-        worlds.open(Path(near), clock=clock, seed=seed, delay=delay, lose=lose) as world,
+        worlds.open(Path(near), clock=clock, seed=seed, delay=delay, lose=lose, between=between) as world,
     ):
         yield world

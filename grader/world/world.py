@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
-from itertools import pairwise
 from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
@@ -21,9 +20,11 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError, HarnessError, RecordingError
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import GIB, MIB, NS_PER_S, seconds
+from grader.runtime.model.step_event import ProgramStep, StepEvent
 from grader.runtime.model.trace import (
     AssessedTrace,
     ClockKind,
+    Delivery,
     Endpoint,
     Fault,
     FaultKind,
@@ -60,6 +61,7 @@ from grader.runtime.steps import (
     Interrupt,
     Kill,
     Publish,
+    ReadSteps,
     SendGoal,
     Serve,
     ServeAction,
@@ -70,6 +72,7 @@ from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
 from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, RecordingDiffers, StepTimeout, WrongType
+from grader.world.faults import ALL, RunDraws, injected, names_of, rising, subset
 from grader.world.frames import TRANSFORMS, FrameTransform, last_links, transform_between
 from grader.world.golden import KeptMessage, difference_from_kept, kept_lines, read_kept
 from grader.world.interfaces import let_import, modules_for
@@ -181,6 +184,9 @@ class World:
         drawn_order: Whether the seed decides what runs first of all that is ready; on the wall clock, nothing does.
         delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
         lose: For such topics, the share of messages that are lost.
+        between: What is done to programs, and to what they send each other; see `injected`.
+        swarm: Whether the seed also draws which of the faults, of `delay`, `lose` and `between`, are on.
+        only: What is drawn at all, of all that the seed draws.
         plan: Limits, clock and folder of the programs; None for programs of one's own, which run where they lie.
         measured: How coverage.py measures the lines of programs of one's own; empty if nobody measures them.
         debugger: Where a debugger of such programs is; empty without one.
@@ -188,6 +194,7 @@ class World:
     Attributes:
         session: What the programs run in.
         left_out: Sentences about what launch files describe and was not started, in the order in which they were told.
+        faults: The names of the faults that are on in this run, such as `delay /scan`.
         updates_recordings: Whether `record` writes what it would compare.
     """
 
@@ -202,6 +209,9 @@ class World:
         drawn_order: bool = False,
         delay: Mapping[str, tuple[float, float]] | None = None,
         lose: Mapping[str, float] | None = None,
+        between: Mapping[str, Mapping[str, Any]] | None = None,
+        swarm: bool = False,
+        only: RunDraws = ALL,
         plan: Plan | None = None,
         measured: str = "",
         debugger: str = "",
@@ -227,7 +237,21 @@ class World:
             measured=measured,
             debugger=debugger,
         )
-        self._plan = replace(plan, connections=tuple(_connections(seed, delay or {}, lose or {})))
+        delay, lose = delay or {}, lose or {}
+        faults = tuple(injected(seed, between or {}))
+        self.faults = names_of(delay, lose, faults)
+        if swarm:
+            self.faults = subset(seed, self.faults)
+        if only.faults is not None:
+            self.faults = tuple(name for name in self.faults if name in only.faults)
+        late = {topic: one for topic, one in delay.items() if f"delay {_absolute(topic)}" in self.faults}
+        lost = {topic: one for topic, one in lose.items() if f"lose {_absolute(topic)}" in self.faults}
+        self._plan = replace(
+            plan,
+            connections=tuple(_connections(seed, late, lost)),
+            faults=tuple(one for one in faults if one.name in self.faults),
+            drawn_steps=only.steps,
+        )
         self._observations: list[Observation] = []
         self._messages: dict[str, list[Message]] = {}
         self._read: dict[str, list[Received]] = {}
@@ -1140,6 +1164,33 @@ class World:
         place.mkdir(parents=True, exist_ok=True)
         return keep(self.session, self.trace(), self._drawn, place, why)
 
+    def situation(self) -> dict[str, Any]:
+        """Return what is known of the run so far as plain values, as `failure.json` of a failed test has it.
+
+        Times are in seconds since the test began.
+        """
+        published: dict[str, dict[str, Any]] = {}
+        for one in self._observations:
+            if isinstance(one, (Message, Delivery)):
+                by = "program" if isinstance(one, Message) else "test"
+                found = published.setdefault(f"{one.topic} {by}", {"topic": one.topic, "type": one.type, "by": by})
+                found |= {"messages": found.get("messages", 0) + 1, "last_t_s": seconds(one.t_ns)}
+        logs = [one for one in self._observations if isinstance(one, LogRecord)][-telling.MOST_LINES :]
+        return {
+            "t_s": seconds(self._run.now_ns),
+            "clock": self._clock.value,
+            "seed": self._drawn,
+            "faults": list(self.faults),
+            "programs": [_as_plain(program) for program in self.programs],
+            "waiting": [*telling.waiting(self._graph, self._offers, self._functions)],
+            "does_not_fit": [*telling.unheard(self._graph, self._offers), *telling.apart(self._graph)],
+            "published": [published[key] for key in sorted(published)],
+            "logs": [
+                {"t_s": seconds(one.t_ns), "program": one.process, "severity": one.severity, "text": one.text}
+                for one in logs
+            ],
+        }
+
     def _repr_html_(self) -> str:
         """Return the run so far as a notebook shows it: a page in the page that plays it."""
         from grader.world.keeping import page_of  # noqa: PLC0415 - as above
@@ -1171,7 +1222,15 @@ class World:
     @property
     def is_drawn(self) -> bool:
         """Whether anything in this run was drawn from its seed."""
-        return self._plan.drawn_order or bool(self._plan.connections)
+        return self._plan.drawn_order or bool(self._plan.connections or self._plan.faults)
+
+    def steps(self) -> list[ProgramStep]:
+        """Return what each program has done so far, step by step; empty on the wall clock."""
+        found = []
+        for t_ns, process, name, deviates, events in self._run.perform(ReadSteps())[0]["steps"]:
+            done = tuple(StepEvent(node, does, what, tuple(others)) for node, does, what, others in events)
+            found.append(ProgramStep(t_ns, process, name, deviates, done))
+        return found
 
     @property
     def remarks(self) -> list[str]:
@@ -1312,6 +1371,15 @@ def _portable(part: str, number: int, content: Any) -> tuple[str, int, Any]:
     return part, number, content
 
 
+def _as_plain(program: Program) -> dict[str, Any]:
+    """Return a program as plain values: whether it runs, and what it failed of."""
+    fault, failed = program.fault, None
+    if fault is not None:
+        place = {"file": str(program.root / fault.file) if fault.file else "", "line": fault.line}
+        failed = {"kind": fault.kind.value, "text": fault.text, "t_s": seconds(fault.t_ns), **place}
+    return {"name": program.name, "running": program.running, "exit_code": program.exit_code, "failed": failed}
+
+
 def _modules_for(folders: Sequence[Path]) -> tuple[str, ...]:
     """Return where packages are that programs of folders need and nobody has installed; a test may import them too."""
     found = tuple(str(path) for folder in folders for path in modules_for(folder))
@@ -1334,17 +1402,12 @@ def _connections(
     shares = {_absolute(topic): share for topic, share in lose.items()}
     for topic in dict.fromkeys((*delays, *shares)):
         between, share = delays.get(topic, (0.0, 0.0)), shares.get(topic, 0.0)
-        if not (isinstance(between, (tuple, list)) and len(between) == 2 and _rising(0, *between)):
+        if not (isinstance(between, (tuple, list)) and len(between) == 2 and rising(0, *between)):
             raise ValueError(f"delay: {topic}: expected the least and the most seconds, found {between!r}")
-        if not _rising(0, share, 1):
+        if not rising(0, share, 1):
             raise ValueError(f"lose: {topic}: expected a share from 0 to 1, found {share!r}")
         delay_ns = round(between[0] * NS_PER_S), round(between[1] * NS_PER_S)
         yield PlannedConnection(topic, delay_ns, share, derive(seed, "connection", topic))
-
-
-def _rising(*numbers: Any) -> bool:
-    """Return whether all of some values are numbers, and none is less than the one before it."""
-    return all(isinstance(one, (int, float)) for one in numbers) and all(a <= b for a, b in pairwise(numbers))
 
 
 def _absolute(name: str) -> str:

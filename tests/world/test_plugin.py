@@ -253,7 +253,9 @@ def test_a_wrong_option_of_the_marker_is_told(suite: pytest.Pytester) -> None:
     text = "import pytest\n@pytest.mark.ros(sede=1)\ndef test_it(ros): pass\n"
     result = run(suite, text)
     assert result.ret != 0
-    result.stdout.fnmatch_lines(["*@pytest.mark.ros: expected clock, seed, seeds, delay, lose by name, found sede"])
+    result.stdout.fnmatch_lines(
+        ["*@pytest.mark.ros: expected clock, seed, seeds, delay, lose, between by name, found sede"]
+    )
 
 
 CLOCKS = """

@@ -86,5 +86,5 @@ def test_the_workflow_of_the_page_tests_a_package(workspace: Path) -> None:
     done = subprocess.run(test, shell=True, cwd=package, capture_output=True, text=True, check=False)
     assert " 1 failed, 3 passed" in done.stdout, done.stdout + done.stderr
     kept = sorted(path.name for path in (package / "runs").rglob("*") if path.is_file())
-    assert kept == ["recording.mcap", "run.html"]
+    assert kept == ["failure.json", "recording.mcap", "run.html"]
     assert "recording.mcap" in (package / "junit.xml").read_text()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -67,6 +67,8 @@ class Inbox:
         self._pause = pause
         self._expected: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
         self._kept: weakref.WeakKeyDictionary[Any, deque[Any]] = weakref.WeakKeyDictionary()
+        #: The messages of each subscription that are still on their way in virtual time, because they are late.
+        self._held: weakref.WeakKeyDictionary[Any, deque[Any]] = weakref.WeakKeyDictionary()
         #: How many announced messages have not come, by topic or service.
         self.lost: Counter[str] = Counter()
         #: How many wait sets wait for a receiver now, by the address of its handle: its messages are read at once.
@@ -99,6 +101,7 @@ class Inbox:
         """Discard the expected messages of a receiver that is being destroyed, or was freed."""
         self._expected.pop(receiver, None)
         self._kept.pop(receiver, None)
+        self._held.pop(receiver, None)
 
     def expect(self, arrivals: Mapping[str, int]) -> None:
         """Add messages that the grader has announced, and wait until they have arrived."""
@@ -169,9 +172,38 @@ class Inbox:
             else:
                 # a subscription that replaced another may have missed messages in between, as in any ROS system
                 if receiver not in self._successors:
-                    self.lost[_channel(receiver)] += self._expected[receiver]
+                    self.lost[channel_name(receiver)] += self._expected[receiver]
                 self._expected[receiver] = 0
         return arrived
+
+    def hold(self, held: Mapping[str, Sequence[bool]]) -> None:
+        """Take messages, which other processes have just sent, before any executor finds them.
+
+        Args:
+            held: By channel of a topic, for each message whether it is kept until it is let go; the others are lost.
+        """
+        context = self._endpoints.context()
+        for channel, flags in held.items():
+            for subscription in self._endpoints.receivers(channel):
+                if self._expected.get(subscription, 0) > 0:
+                    self._keep_all(subscription, more=False)  # what came before stays before
+                waiting = self._held.setdefault(subscription, deque())
+                for is_kept in flags[-_depth(subscription) :]:  # what the queue has dropped never comes
+                    if context is None or not self._await_ready(subscription, context):
+                        self.lost[channel_name(subscription)] += 1
+                        continue
+                    with subscription.handle:
+                        found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+                    if found is not None and is_kept:
+                        waiting.append(found)
+
+    def let_go(self, released: Mapping[str, int]) -> None:
+        """Let executors find messages that are held, so many of each channel."""
+        for channel, count in released.items():
+            for subscription in self._endpoints.receivers(channel):
+                waiting = self._held.get(subscription) or deque()
+                kept = self._kept.setdefault(subscription, deque(maxlen=_depth(subscription)))
+                kept.extend(waiting.popleft() for _ in range(min(count, len(waiting))))
 
     def keeps_anything(self) -> bool:
         """Return whether any message was taken ahead of time and is still kept."""
@@ -182,7 +214,8 @@ class Inbox:
         return len(self._expected) > 0 and any(count > 0 for count in self._expected.values())
 
 
-def _channel(receiver: Any) -> str:
+def channel_name(receiver: Any) -> str:
+    """Return the name of the topic or service of a subscription, a client or a server."""
     return str(receiver.topic_name) if hasattr(receiver, "topic_name") else service_name(receiver)
 
 

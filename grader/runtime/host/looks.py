@@ -20,6 +20,7 @@ import rclpy.task
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from .clock import VirtualClock
+from .endpoints import service_name
 from .ros_state import RosState, see_whole_graph
 
 #: The methods with which nodes query the whole graph.
@@ -103,6 +104,8 @@ def _note_found(ros: RosState, cls: Any, name: str) -> None:
     @functools.wraps(look)
     def looked(self: Any, *args: Any, **kwargs: Any) -> Any:
         found = look(self, *args, **kwargs)
+        if isinstance(self, rclpy.client.Client):
+            ros.note(f"{'finds' if found else 'misses'} request {service_name(self)}")
         if found:
             ros.outbox.note_waited()
         return found

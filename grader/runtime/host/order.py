@@ -3,6 +3,8 @@
 import random
 from collections.abc import Callable, Iterable
 
+from .protocol import MOST_DONE
+
 
 class ReadyOrder:
     """Decides what one look of an executor finds.
@@ -13,23 +15,49 @@ class ReadyOrder:
 
     Args:
         now_ns: Returns the virtual time.
+
+    Attributes:
+        did: What the program has done since the last report, in order; as in `Progress`.
+        drew: Whether a look since then has found less than all that was ready.
     """
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
         self._now_ns = now_ns
+        self._seed = ""
         self._draw: random.Random | None = None
+        self.did: list[str] = []
+        self.drew = False
         #: What was waited for, and was not ready, at this instant or until then; the addresses of handles.
         self._waited_for: set[int] = set()
         self._at_ns = 0
 
     def begin(self, seed: str) -> None:
-        """Draw from a seed from now on."""
-        self._draw = random.Random(f"{seed}/ready")  # noqa: S311 - it has to repeat
+        """Draw from a seed from now on, where a step says so."""
+        self._seed = seed
+
+    def step(self, name: str | None) -> None:
+        """Begin a step of the run: its name, from which its draws follow; None if every look finds all in it.
+
+        Each step draws for itself, so that what one draws does not depend on whether an earlier one has drawn.
+        """
+        drawn = self._seed and name is not None
+        self._draw = random.Random(f"{self._seed}/ready/{name}") if drawn else None  # noqa: S311 - it has to repeat
 
     @property
     def is_drawn(self) -> bool:
-        """Whether anything is drawn; otherwise every look finds all that is ready."""
-        return self._draw is not None
+        """Whether anything may be drawn in this run; otherwise every look finds all that is ready."""
+        return bool(self._seed)
+
+    def note(self, what: str) -> None:
+        """Note something that the program does, for the next report."""
+        if self._seed and len(self.did) < MOST_DONE:
+            self.did.append(what)
+
+    def told(self) -> tuple[list[str], bool]:
+        """Return what was noted since the last call, and whether a look since then has found less than was ready."""
+        told = self.did, self.drew
+        self.did, self.drew = [], False
+        return told
 
     def wait_for(self, entities: Iterable[int]) -> None:
         """Note that an executor has waited for entities until now, none of which was ready before."""
@@ -45,4 +73,5 @@ class ReadyOrder:
             return set()
         # beside what was ready before, the look finds one that came in time, or none
         found = {self._draw.choice(new)} if len(new) == len(ready) or self._draw.getrandbits(1) else set()
+        self.drew |= len(new) > len(found)
         return {*new} - found

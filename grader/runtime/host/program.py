@@ -121,6 +121,7 @@ def run(request: dict[str, Any], host: Host | None = None) -> None:  # noqa: PLR
     if isinstance(time, VirtualTime):
         if request["drawn_order"]:
             time.order.begin(request["seed"])
+            time.order.step(start.order)
         time.start(start.now_ns, request["steady_ns"], charged=request["charged"])
     else:
         time.start(start.now_ns, request["steady_ns"])

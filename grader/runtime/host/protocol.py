@@ -189,6 +189,9 @@ class Progress(NamedTuple):
         None  # all that it has, if any changed; checked, None for what is invalid
     )
     sees_graph: bool = False  # with endpoints: whether its program queries the graph
+    # Where the order is drawn, what the program has done: `timer`, or a verb and a channel, such as `reads topic /x`.
+    did: Sequence[str] = ()
+    drew: bool = False  # and whether a look of an executor has found less than was ready
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> "Progress":
@@ -206,7 +209,23 @@ class Progress(NamedTuple):
             # One more than are believed, so that it shows.
             _claims(data.get("endpoints"), MOST_CLAIMS + 1),
             data.get("sees_graph") is True,
+            [one for one in _list(data.get("did"))[:MOST_DONE] if _is_done(one)],
+            data.get("drew") is True,
         )
+
+
+#: The most that one report tells of what was done.
+MOST_DONE = 1_000
+
+
+def _is_done(data: Any) -> bool:
+    """Return whether a value says what a program can do: run a timer, or something with a channel."""
+    if not isinstance(data, str):
+        return False
+    verb, _, channel = data.partition(" ")
+    kind, _, name = channel.partition(" ")
+    known = verb in ("reads", "sends", "finds", "misses") and kind in ("topic", "request", "response")
+    return data == "timer" or (known and is_name(name))
 
 
 #: The most files that are kept of those that a program wrote.
@@ -498,6 +517,8 @@ class Go(NamedTuple):
     free_until_ns: int = 0  # before this moment it may let time pass without asking
     arrivals: Mapping[str, int] = NONE  # by channel: the messages that are on their way to it, which it waits for first
     interrupt: bool = False  # whether it receives the stop signal now, as from Ctrl-C
+    released: Mapping[str, int] = NONE  # by channel: how many messages that it holds have arrived now
+    order: str | None = None  # the name of the step, if it draws what executors find first; None if they find all
 
 
 class Stop(NamedTuple):
@@ -508,6 +529,8 @@ class Expect(NamedTuple):
     """In virtual time, while it waits for an answer: it receives what another one has sent that is about to leave."""
 
     arrivals: Mapping[str, int]  # as in `Go`
+    # By channel, for each message that it takes now: whether it holds it until a `Go` releases it, or loses it.
+    held: Mapping[str, Sequence[bool]] = {}
 
 
 class Counterparts(NamedTuple):

@@ -22,6 +22,7 @@ class RosState(NamedTuple):
     inbox: Inbox  # what is on its way to this process, or was taken ahead of time
     graph: SeenGraph  # whether this process sees the counterparts that the grader expects
     events: Events  # what the program is told of its counterparts
+    note: Callable[[str], None]  # notes what the program does, as `order.ReadyOrder.note`
 
     @property
     def sending_and_removed(self) -> bool:
@@ -29,8 +30,12 @@ class RosState(NamedTuple):
         return self.endpoints.removed and self.outbox.sending
 
 
-def new_ros_state() -> RosState:
-    """Return the state of a process that has no node yet."""
+def new_ros_state(note: Callable[[str], None]) -> RosState:
+    """Return the state of a process that has no node yet.
+
+    Args:
+        note: Notes what the program does.
+    """
     from .endpoints import Endpoints
     from .events import Events
     from .inbox import Inbox
@@ -39,7 +44,7 @@ def new_ros_state() -> RosState:
 
     events = Events()
     endpoints = Endpoints(events)
-    return RosState(endpoints, Outbox(), Inbox(endpoints), SeenGraph(endpoints, events), events)
+    return RosState(endpoints, Outbox(), Inbox(endpoints), SeenGraph(endpoints, events), events, note)
 
 
 def see_whole_graph(ros: RosState, settle: Callable[[], None]) -> None:

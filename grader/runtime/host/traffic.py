@@ -17,8 +17,12 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from .actions import Counted, install_actions
 from .clock import VirtualClock
 from .endpoints import BACKGROUND, service_name
+from .inbox import channel_name
 from .lifetimes import install_departures, install_endpoints
 from .ros_state import RosState
+
+#: The methods with which an executor takes something, and the kinds of its channels.
+TAKEN = {"_take_subscription": "topic", "_take_client": "response", "_take_service": "request"}
 
 
 def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
@@ -58,6 +62,7 @@ def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
         # Time stands still while a program runs: one that only sends would never get further.
         clock.busy_sending()
         early = ros.outbox.early[name]
+        ros.note(f"sends {name}")
         ros.outbox.note_sent(name, handle, work_ns())
         try:
             return send()
@@ -98,8 +103,21 @@ def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
     rclpy.service.Service.send_response = counted_respond
     _install_transitions(ros, counted)
     install_actions(ros, clock, counted, settle=settle, leave=leave)
-    for name in ("_take_subscription", "_take_client", "_take_service"):
+    for name in TAKEN:
         setattr(rclpy.executors.Executor, name, _counting_take(name, ros, clock, settle))
+    _note_timers(ros)
+
+
+def _note_timers(ros: RosState) -> None:
+    """Note each timer that an executor runs."""
+    take = rclpy.executors.Executor._take_timer
+
+    @functools.wraps(take)
+    def noted(self: Any, timer: Any) -> Any:
+        ros.note("timer")
+        return take(self, timer)
+
+    rclpy.executors.Executor._take_timer = noted
 
 
 def _install_transitions(ros: RosState, counted: Counted) -> None:
@@ -135,6 +153,7 @@ def _counting_take(name: str, ros: RosState, clock: VirtualClock, settle: Callab
 
     def counted_take(self: Any, receiver: Any) -> Any:
         clock.busy()
+        ros.note(f"reads {TAKEN[name]} {channel_name(receiver)}")
         # What the process itself has sent since may push out what is kept: the queue is the same as without the grader
         # only once that has arrived.
         if name == "_take_subscription" and _may_be_pushed_out(ros, receiver):

@@ -119,7 +119,7 @@ class VirtualTime:
         from . import lifetimes, looks, ros, ros_clocks, traffic, wait_set
         from .ros_state import new_ros_state
 
-        self._ros = new_ros_state()
+        self._ros = new_ros_state(self.order.note)
         self._clocks = ros_clocks.RosClocks(self.clock)
         self.clock.real_ns = ros_clocks.system_ns
         # Each replacement calls what it finds, so that of two for one function the later one is called first.
@@ -193,6 +193,9 @@ class VirtualTime:
             threads=self.scheduler.others_ran(),
         )
         self._charges = False
+        if self.order.is_drawn:
+            did, drew = self.order.told()
+            found = found._replace(did=did, drew=drew)
         self.clock.paused = self.clock.counted = False
         self._moved = 0
         return found if self._ros is None else self._with_traffic(found, self._ros)
@@ -303,7 +306,11 @@ class VirtualTime:
             self._real.kill(os.getpid(), signal.SIGINT)
             return
         self._move_to(answer.now_ns)
+        self.order.step(answer.order)
         self._free_until_ns = answer.free_until_ns
+        if self._ros is not None and answer.released:
+            self.clock.busy()  # as below
+            self._ros.inbox.let_go(answer.released)
         if self._ros is not None and answer.arrivals:
             self.clock.busy()  # a busy loop polls what has arrived before it lets time pass again
             began_s = self._real.perf_counter()
@@ -327,6 +334,7 @@ class VirtualTime:
         assert self._ros is not None  # who has no endpoints is never told to wait
         if isinstance(answer, Expect):
             self._ros.inbox.expect(answer.arrivals)
+            self._ros.inbox.hold(answer.held)
             return MessagesArrived()
         missing = self._ros.graph.await_matches(answer.expected, answer.wait_s)
         self._ros.graph.await_absence(answer.gone, answer.wait_s)

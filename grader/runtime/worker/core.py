@@ -40,6 +40,8 @@ class Process:
 
     Attributes:
         name: The wanted file name, which identifies the process in traces.
+        resumes_ns: Until when it does not run, whatever arrives.
+        released: Messages that it holds and that arrive with its next step, by channel.
         wake_ns: When it next wants to run, in nanoseconds of virtual time, or None.
         claims: Its endpoints, as it reports them.
         told: The counterparts that it has to wait for.
@@ -53,6 +55,8 @@ class Process:
     """
 
     name: str
+    resumes_ns: int = field(default=0, kw_only=True)
+    released: dict[str, int] = field(default_factory=dict, kw_only=True)
     wake_ns: int | None = field(default=None, kw_only=True)
     claims: list[Claim] = field(default_factory=list, kw_only=True)
     told: Counterparts = field(default=NO_COUNTERPARTS, kw_only=True)
@@ -211,10 +215,16 @@ class Core(Generic[P]):
         agenda: What is still to come.
         includes_end: Whether what happens at the moment to which a step goes belongs to the step, as it does not belong
             to a plan. The run then ends a nanosecond later, of which no process is told.
-        shuffle: Shuffles the processes that could run at one instant; without it, they run in their order.
+        choose: Returns which of the processes that could run at one instant does, from the name of the step; without
+            it, they run in their order.
+        held: The topics whose messages do not arrive at once where another process receives them.
 
     Attributes:
         processes: The processes.
+        step: The name of the step that is next, or under way: the instant, and how many came before at it. What was
+            drawn at an earlier instant does not change the names of later steps.
+        deviates: Whether the process that runs next is another one than their order says.
+        withheld: The messages that were sent and do not arrive at once: to whom, on which topic, how many.
         now_ns: Nanoseconds of virtual time since the start of the run.
         kept: How many messages each process has published on a topic of a latched publisher of its own.
         remains: What processes have left in the graph that ended without a farewell.
@@ -226,14 +236,20 @@ class Core(Generic[P]):
         agenda: Agenda,
         *,
         includes_end: bool = False,
-        shuffle: Callable[[list[P]], None] | None = None,
+        choose: Callable[[str, Sequence[P]], P] | None = None,
+        held: Iterable[str] = (),
     ) -> None:
         self._agenda = agenda
         self._past_end_ns = int(includes_end)
-        self._shuffle = shuffle
+        self._choose = choose
+        self._held = frozenset(held)
         self._to_ns = 0
         self._free_until_ns = 0
         self._steps = 0
+        self._counted_ns = self._counted = 0
+        self.step = ""
+        self.deviates = False
+        self.withheld: list[tuple[P, str, int]] = []
         self._hops = 0
         #: When the publishers and subscriptions of each process, by their numbers there, have appeared.
         self._appeared_ns: dict[tuple[str, int], int] = {}
@@ -271,6 +287,8 @@ class Core(Generic[P]):
     def run(self, process: P) -> Iterator[Command[P]]:
         """Let one process run, with the messages on their way to it."""
         arrivals, process.arrivals, process.nudged = process.arrivals, {}, False
+        self._name_step()
+        self._counted += 1
         if arrivals:
             self._count_hop()
             if self._hops > MOST_HOPS:
@@ -315,20 +333,31 @@ class Core(Generic[P]):
         """Return the process that runs next at this instant; None if none has anything to do."""
         found = []
         for process in self.processes:
-            if not process.ended and (process.arrivals or process.nudged or self._is_due(process)):
-                if self._shuffle is None:
+            is_paused = process.resumes_ns > self.now_ns
+            if not (process.ended or is_paused) and (process.arrivals or process.nudged or self._is_due(process)):
+                if self._choose is None:
                     return process
                 found.append(process)
-        if self._shuffle is not None:
-            self._shuffle(found)
-        return found[0] if found else None
+        if self._choose is None or not found:
+            return None
+        self._name_step()
+        chosen = self._choose(self.step, found)
+        self.deviates = chosen is not found[0]
+        return chosen
+
+    def _name_step(self) -> None:
+        if self._counted_ns != self.now_ns:
+            self._counted_ns, self._counted = self.now_ns, 0
+        self.step = f"{self.now_ns}.{self._counted}"
 
     def _is_due(self, process: P) -> bool:
         return process.wake_ns is not None and process.wake_ns <= self.now_ns
 
     def _next_ns(self) -> int:
         """Return the next moment at which anything is due."""
-        wakes = [p.wake_ns for p in self.processes if not p.ended and p.wake_ns is not None]
+        running = [p for p in self.processes if not p.ended]
+        wakes = [max(p.wake_ns, p.resumes_ns) for p in running if p.wake_ns is not None]
+        wakes += [p.resumes_ns for p in running if p.resumes_ns > self.now_ns and (p.arrivals or p.nudged)]
         return max(self.now_ns, min(self._agenda.moments() + wakes))
 
     def _quiet_until(self, process: P) -> int:
@@ -336,10 +365,12 @@ class Core(Generic[P]):
         moments = self._agenda.moments(self._past_end_ns)
         for other in self.processes:
             if other is not process and not other.ended:
-                if other.arrivals or other.nudged:
+                if other.resumes_ns > self.now_ns:
+                    moments.append(other.resumes_ns)
+                elif other.arrivals or other.nudged:
                     return self.now_ns
                 if other.wake_ns is not None:
-                    moments.append(other.wake_ns)
+                    moments.append(max(other.wake_ns, other.resumes_ns))
         return max(self.now_ns, min(moments))
 
     def _count_hop(self) -> None:
@@ -400,7 +431,10 @@ class Core(Generic[P]):
                 self.kept[sender.name, name] += count if any(w.qos.latched for w in writers) else 0
                 for process in self.processes:
                     if any(compatible(w, r) for w in writers for r in readers_of(process.claims, name)):
-                        announce(process, channel, count)
+                        if name in self._held and process is not sender and channel not in process.unmatched:
+                            self.withheld.append((process, name, count))
+                        else:
+                            announce(process, channel, count)
             elif kind in ("request", "response"):
                 self.exchanged(kind, name, count, senders(sender, channel))
 

@@ -137,7 +137,9 @@ class VirtualRunner(Runner):
         workload = student.measured(now_ns)
         workload.begin(now_ns, arrivals=bool(run.arrivals))
         interrupt = student.stop_signalled and not student.stopping
-        student.tell(Go(epoch_ns + now_ns, free_ns, run.arrivals, interrupt))
+        released, student.released = student.released, {}
+        order = self._core.step if self._draws() else None
+        student.tell(Go(epoch_ns + now_ns, free_ns, run.arrivals, interrupt, released, order))
         student.stopping = student.stop_signalled
         self._hear(student, workload)
         self._remove_done()
@@ -145,6 +147,10 @@ class VirtualRunner(Runner):
         if self._plan.stop_when_unfit and hopeless([student]) and self._unfit() and not self._floods():
             self._agenda.end_ns = self._core.now_ns
         self._end_if_full(self._core.now_ns)
+
+    def _draws(self) -> bool:
+        """Return whether the order of callbacks is drawn in this step."""
+        return False
 
     def _floods(self) -> bool:
         return self._core.is_restless or self._recorder.floods(self._core.now_ns)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
+import jsonschema
 import pytest
 from places import GRADE, REPORTED, ROOT, TESTS
 from tiers import each, more
@@ -38,6 +39,8 @@ from grader.runtime.model.trace import (
 )
 from grader.runtime.sandbox.bubblewrap import ROOT_NAME, USER_NAME
 from grader.runtime.session import Job
+
+SCHEMA = json.loads((ROOT / "grader/grading/reporting/observation.schema.json").read_text(encoding="utf-8"))
 
 FLOAT = "std_msgs/msg/Float32"
 
@@ -91,7 +94,9 @@ def test_texts_and_arrays_are_described() -> None:
         "none: 0 elements",
         "zero: 0",
     ]
-    told = json.loads(summary_to_json(summarise(a_trace(graph, *said), ["a.py"], "none")))["topics"][0]
+    whole = json.loads(summary_to_json(summarise(a_trace(graph, *said), ["a.py"], "none")))
+    jsonschema.validate(whole, SCHEMA)
+    told = whole["topics"][0]
     assert told["texts"]["words"] == {"values": ["w0", "w1", "w2", "w3", "w4"], "different": 5}
     assert told["lengths"]["xs"] == [1, 5]
 
@@ -197,7 +202,19 @@ def test_hostile_text_stays_text() -> None:
     record = LogRecord(0, "a.py", "INFO", "a", "\x1b[2J\u202e\udcff")
     summary = summarise(a_trace(record), ["a.py"], "none")
     assert not set("\x1b\u202e\udcff") & set(render_summary(summary))
-    assert json.loads(summary_to_json(summary).encode())["records"][0]["severity"] == "INFO"
+    told = json.loads(summary_to_json(summary).encode())
+    assert told["records"][0]["severity"] == "INFO"
+    jsonschema.validate(told, SCHEMA)
+
+
+def test_what_is_printed_for_programs_follows_its_schema() -> None:
+    """With faults, hints, offers and output; and a key that the schema lacks would be found."""
+    failed = Fault(NS_PER_S, "client.py", FaultKind.EXITED, "exited with code 3", exit_code=3)
+    found = (failed, Offer(0, "a.py", "parameter", "/a:rate", "1.0"), OutputLine(0, "a.py", "stdout", "text"))
+    told = json.loads(summary_to_json(summarise(a_trace(*found), ["a.py"], "none")))
+    jsonschema.validate(told, SCHEMA)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**told, "extra": 1}, SCHEMA)
 
 
 @pytest.mark.ros

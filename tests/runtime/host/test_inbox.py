@@ -83,7 +83,7 @@ def ros(monkeypatch: pytest.MonkeyPatch, waits: list[float], context: Context) -
 
     launcher.load_package()
     sys.modules["_grader_host.unseen"].IMPORTS.end()
-    made = importlib.import_module("_grader_host.ros_state").new_ros_state()
+    made = importlib.import_module("_grader_host.ros_state").new_ros_state(lambda _: None)
     made.endpoints.contexts.append(weakref.ref(context))
     inbox = sys.modules["_grader_host.inbox"].Inbox
     return made._replace(inbox=inbox(made.endpoints, lambda receiver, *_: receiver.handle.look(), waits.append))

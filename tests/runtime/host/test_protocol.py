@@ -89,6 +89,8 @@ PROGRESS = Progress(
     lost={"request /s": 1},
     endpoints=[KNOWN, Claim("client", "/s", "std_srvs/srv/Empty", sends=EndQos(False, True, 5, True, 6))],
     sees_graph=True,
+    did=["timer", "sends topic /x", "misses request /s"],
+    drew=True,
 )
 REPORTS: tuple[Report, ...] = (
     Ready("ab" * 16),
@@ -133,9 +135,9 @@ COUNTERPARTS = Counterparts(
     graph={"publisher /x": 1},
 )
 ANSWERS: tuple[Answer, ...] = (
-    Go(5, 6, {"topic /x": 1}, interrupt=True),
+    Go(5, 6, {"topic /x": 1}, interrupt=True, released={"topic /x": 2}, order="5.0"),
     Stop(),
-    Expect({"response /s": 1}),
+    Expect({"response /s": 1}, {"topic /x": [True, False]}),
     AwaitMatches(
         Counterparts({"/x": [1, 2]}, {"/y": [1]}, {}, {}, {"/s": 1}, {"7": 1}, {"8": []}, {"publisher /x": 1}),
         ["/s"],
@@ -149,6 +151,16 @@ def test_what_the_host_reports_is_believed(report: Report) -> None:
     """Field by field: none is lost on the way, and none is taken for another one."""
     assert not any(value in (field, None) for field, value in zip(report._fields, report, strict=True))
     assert decoded_report(encoded_line(report)) == report
+
+
+def test_only_what_a_program_can_do_is_believed() -> None:
+    """A report says it in words that end in a sentence below a failure."""
+    hostile = ["timer", "reads topic /x", "reads topic x", "steals topic /x", "reads file /x", 5, "reads topic /x\n"]
+    assert Progress.checked({"did": [*hostile, *["timer"] * 2_000]}).did == [
+        "timer",
+        "reads topic /x",
+        *["timer"] * 993,
+    ]
 
 
 @pytest.mark.parametrize("answer", ANSWERS, ids=lambda answer: type(answer).__name__)

@@ -30,7 +30,7 @@ PYTHON = {
     "rclpy.context:Context": ("handle", "ok", "shutdown", "try_shutdown"),
     "rclpy.executors": ("Timer", "await_or_execute"),
     "rclpy.executors:Executor": (
-        *("_take_subscription", "_take_client", "_take_service"),
+        *("_take_subscription", "_take_client", "_take_service", "_take_timer"),
         *("_wait_for_ready_callbacks", "create_task"),
     ),
     "rclpy.guard_condition:GuardCondition": ("handle", "trigger"),

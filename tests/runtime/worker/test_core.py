@@ -165,7 +165,8 @@ class Host:
         )
         inbox = SimpleNamespace(lost=Counter(), expect=ignored)
         graph = SimpleNamespace(sees_graph=False, is_timed=False)
-        self.time._ros = RosState(self.endpoints, self.outbox, inbox, graph, events=SimpleNamespace())  # type: ignore[arg-type]
+        told = {"events": SimpleNamespace(), "note": self.time.order.note}
+        self.time._ros = RosState(self.endpoints, self.outbox, inbox, graph, **told)  # type: ignore[arg-type]
         self.time._move_to(EPOCH_NS)
 
     def ask(self, report: Idle) -> Answer:
@@ -727,7 +728,7 @@ def test_a_step_includes_its_end_and_tells_nobody_of_the_nanosecond_after_it() -
 
 def test_with_a_drawn_order_any_ready_process_may_be_the_first() -> None:
     """The draw decides among those that have something to do, each time anew."""
-    run = Played("a", "b", "c", "rests", shuffle=lambda found: found.reverse())
+    run = Played("a", "b", "c", "rests", choose=lambda _, found: found[-1])
     run.play(run.core.begin())
     run.done.clear()
     for name in ("a", "b", "c"):
