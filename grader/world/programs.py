@@ -172,7 +172,8 @@ def _launch_file_of(package: str, name: str, near: Sequence[Path]) -> Found:
         packages |= {project.name for project in projects}
         for project in (one for one in projects if one.name == package):
             files = sorted(
-                (root / project.folder).rglob("*launch.py"), key=lambda path: (path.parent.name != "launch", path)
+                (path for path in (root / project.folder).rglob("*") if is_launch_file(path.name)),
+                key=lambda path: (path.parent.name != "launch", path),
             )
             installed = {file for _, group in project.data_files or () for file in group}
             for path in (one for one in files if one.name == name):

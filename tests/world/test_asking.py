@@ -215,6 +215,18 @@ def test_a_launch_file_starts_its_nodes(ros_session: Worlds, workspace: Path) ->
         assert wrong.value.hint == "did you mean robot/listener.launch.py?"
 
 
+def test_a_launch_file_in_xml_is_found_by_its_package(ros_session: Worlds, workspace: Path) -> None:
+    """As `ros2 launch` finds it, whatever language it is written in."""
+    written = '<launch><node pkg="robot" exec="talker" name="speaker"/></launch>'
+    (workspace.parent / "launch/talker.launch.xml").write_text(written, encoding="utf-8")
+    setup = workspace.parent / "setup.py"
+    setup.write_text(setup.read_text(encoding="utf-8").replace("*.launch.py", "*.launch.*"), encoding="utf-8")
+    with ros_session.open(workspace) as ros:
+        ros.launch("robot/talker.launch.xml")
+        ros.advance(1.0)
+        assert ros.nodes() == ["/speaker"]
+
+
 def test_a_launch_file_beside_its_packages_finds_them(ros_session: Worlds, workspace: Path) -> None:
     """It lies at the top of the workspace, in no package; the test lies in one."""
     top = workspace.parents[2]
