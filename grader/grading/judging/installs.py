@@ -60,7 +60,7 @@ def _manifest(names: Sequence[str]) -> tuple[str, str]:
 
 
 def _build_type(_: Sequence[str]) -> tuple[str, str]:
-    what = f"it names no build type, which stands for ROS 1 with CMake, {_BUILD_FAILS}"
+    what = f"it does not name a build type, which stands for ROS 1 with CMake, {_BUILD_FAILS}"
     return what, "write <export><build_type>ament_python</build_type></export> into it"
 
 

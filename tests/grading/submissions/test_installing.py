@@ -133,7 +133,7 @@ WRONG: dict[str, tuple[FlawKind, Mapping[str, str | None], str]] = {
     "no build type": (
         FlawKind.BUILD_TYPE,
         {"package.xml": MANIFEST.replace("<build_type>ament_python</build_type>", "")},
-        "my_robot/package.xml: it names no build type, which stands for ROS 1 with CMake, so the build fails",
+        "my_robot/package.xml: it does not name a build type, which stands for ROS 1 with CMake, so the build fails",
     ),
     "no setup.py": (
         FlawKind.NO_SETUP,

@@ -109,7 +109,7 @@ class SendsGoals:
         most = "" if self.at_most is None else f" and at most {self.at_most}"
         contents = [rules_text(rules) for rules in (*self.goals, self.every) if rules]
         content = f", with {first_few(contents)}" if contents else ""
-        turn = ", one after the other" if self.one_at_a_time else ""
+        turn = ", in turn" if self.one_at_a_time else ""
         return f"at least {counted(self._least, 'goal')}{most} for {self.action}{content}{turn}"
 
     @property
