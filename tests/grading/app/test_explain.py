@@ -75,6 +75,9 @@ def test_a_check_shows_what_a_rubric_has_to_give() -> None:
         "window": False,
         "partly_tolerance": False,
         "after_discovery": False,
+        "full": False,
+        "none": False,
+        "combine": False,
     }
     assert isinstance(check, CheckExplanation)
     assert check.used_by == (

@@ -93,7 +93,7 @@ def test_a_simulation_is_named_by_its_file_or_alone(desk: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("sims/world.py", "expected FILE.py:NAME or a built-in one (differential_drive or turtle)"),
+        ("sims/world.py", "expected FILE.py:NAME or a built-in one (differential_drive, robot_in_map or turtle)"),
         ("hall", "expected FILE.py:NAME or a built-in one"),
         ("sims/world.py:hall=[1]", "expected FILE.py:NAME or a built-in one"),
         ("sims/world.py:hall={", "expected FILE.py:NAME or a built-in one"),
