@@ -79,6 +79,7 @@ _FACTS: tuple[tuple[DifferenceKind, str, Callable[[AssessedTrace], object]], ...
     (DifferenceKind.CONTENT, "not started", lambda trace: trace.unstarted),
     (DifferenceKind.CONTENT, "newer Python", lambda trace: trace.newer),
     (DifferenceKind.CONTENT, "result of the test", lambda trace: trace.tested),
+    (DifferenceKind.CONTENT, "pictures of simulations", lambda trace: trace.drawn),
     (DifferenceKind.GRADER, "written files", lambda trace: trace.written),
     (DifferenceKind.GRADER, "notes", lambda trace: trace.notes),
     (DifferenceKind.GRADER, "suspicious actions", lambda trace: trace.reached),
