@@ -147,6 +147,8 @@ class ScriptedStudent:
         self.told = NO_COUNTERPARTS
         self.offers: set[tuple[str, str, str]] = set()
         self.nudged = False
+        self.resumes_ns = 0
+        self.released: dict[str, int] = {}
         self.ended = False
         self.renewed = False
         self.unmatched: frozenset[str] = frozenset()

@@ -209,7 +209,7 @@ class Progress(NamedTuple):
             # One more than are believed, so that it shows.
             _claims(data.get("endpoints"), MOST_CLAIMS + 1),
             data.get("sees_graph") is True,
-            [one for one in _list(data.get("did"))[:MOST_DONE] if _is_done(one)],
+            tuple(one for one in _list(data.get("did"))[:MOST_DONE] if _is_done(one)),
             data.get("drew") is True,
         )
 

@@ -89,7 +89,7 @@ PROGRESS = Progress(
     lost={"request /s": 1},
     endpoints=[KNOWN, Claim("client", "/s", "std_srvs/srv/Empty", sends=EndQos(False, True, 5, True, 6))],
     sees_graph=True,
-    did=["timer", "sends topic /x", "misses request /s"],
+    did=("timer", "sends topic /x", "misses request /s"),
     drew=True,
 )
 REPORTS: tuple[Report, ...] = (
@@ -156,11 +156,11 @@ def test_what_the_host_reports_is_believed(report: Report) -> None:
 def test_only_what_a_program_can_do_is_believed() -> None:
     """A report says it in words that end in a sentence below a failure."""
     hostile = ["timer", "reads topic /x", "reads topic x", "steals topic /x", "reads file /x", 5, "reads topic /x\n"]
-    assert Progress.checked({"did": [*hostile, *["timer"] * 2_000]}).did == [
+    assert Progress.checked({"did": [*hostile, *["timer"] * 2_000]}).did == (
         "timer",
         "reads topic /x",
         *["timer"] * 993,
-    ]
+    )
 
 
 @pytest.mark.parametrize("answer", ANSWERS, ids=lambda answer: type(answer).__name__)
