@@ -259,7 +259,7 @@ class ServedAction:
 
 
 def planned_action(planned: PlannedActionServer) -> ServedAction:
-    """Return the action of a plan, whose goals are answered one after the other as it says."""
+    """Return the action of a plan, whose goals are answered in turn, as it says."""
     kind = wanted_class(planned.type, "action", planned.action)
     place = 0
 

@@ -29,7 +29,7 @@ def kept_lines(messages: Sequence[KeptMessage]) -> str:
 
 
 def read_kept(path: Path) -> list[KeptMessage]:
-    """Read a recording; raises ValueError with file and line for what is none."""
+    """Read a recording; raises ValueError with file and line if it is not one."""
     found: list[KeptMessage] = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         try:

@@ -47,7 +47,7 @@ class Shrunk:
     runs: int
 
 
-#: Asks for runs in which only this is drawn, one after the other, and returns what was found.
+#: Asks for runs in which only this is drawn, one at a time, and returns what was found.
 Shrinking: TypeAlias = Generator[RunDraws, Rerun, Shrunk]
 
 
@@ -285,7 +285,7 @@ def _phrase(event: StepEvent, *, to: bool = True) -> str:
 
 
 def told_of_race(first: Rerun, found: Shrunk) -> list[str]:
-    """Return what is said of a race, as lines: where the runs part, and which draws that takes.
+    """Return the lines about a race: where the runs part, and which draws that takes.
 
     Args:
         first: The run that was shrunk.

@@ -934,7 +934,7 @@ class World:
         return guarded(name, path, work, begin_of(simulation, method, path)) if path else work()
 
     def _checked(self, number: int, method: str, answer: Any) -> Any:
-        """Return what a simulation publishes; raises SimulationError for what is no message of its topics."""
+        """Return what a simulation publishes; raises SimulationError for anything but a message of its topics."""
         simulation, (name, path) = self._simulations[number], self._authored[number]
         types = {**simulation.publishes(), **simulation.records()} if path and isinstance(answer, list) else {}
         try:

@@ -65,7 +65,7 @@ class Scale:
 
     def combined(self, values: Sequence[float]) -> float:
         """Return one number for several, of which none counts as worse than `none`; there is at least one."""
-        # What never happened is infinite, and NaN is no number: without the bound, one would spoil every mean.
+        # What never happened is infinite, and NaN is not a number: without the bound, one would spoil every mean.
         worse, better = (max, min) if self.less_is_better else (min, max)
         bounded = [self.none if math.isnan(value) else better(value, self.none) for value in values]
         if self.combine == "mean":

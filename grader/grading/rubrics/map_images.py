@@ -29,7 +29,7 @@ _PGM = re.compile(rb"(P[25])" + _SPACE + rb"(\d{1,9})" + _SPACE + rb"(\d{1,9})" 
 
 
 class NoImage(ValueError):  # noqa: N818 - reads as what it says
-    """A file is no image of a map; the text says what was expected and what was found."""
+    """A file is not an image of a map; the text says what was expected and what was found."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class MapImage:
 
 
 def read_image(content: bytes) -> MapImage:
-    """Read a PGM or PNG image; raises NoImage for what is none, and for what no map needs."""
+    """Read a PGM or PNG image; raises NoImage for anything else, and for what no map needs."""
     if content.startswith(_SIGNATURE):
         return _read_png(content)
     if content[:2] in (b"P2", b"P5"):

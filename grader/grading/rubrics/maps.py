@@ -115,7 +115,7 @@ _EXPECTED: Sequence[tuple[str, str, Any]] = (
 
 
 def _walls_of(image: MapImage, values: Mapping[str, Any]) -> WallMap:
-    """Return which cells are walls, by the rules of nav2's map_server; free and unknown cells are none."""
+    """Return which cells are walls, by the rules of nav2's map_server; free and unknown cells are not."""
     import numpy as np  # noqa: PLC0415 - most rubrics have no map
 
     mode = values["mode"] or "trinary"

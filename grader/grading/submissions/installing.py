@@ -1,7 +1,7 @@
 """Finds what a build with colcon would refuse or leave out of a submission's packages; it builds and reads nothing.
 
-What is not known for certain is no flaw: a file that a loop of setup.py may install, a function that a star import may
-bring, a package that an unknown one may depend on.
+What is not known for certain is not a flaw: a file that a loop of setup.py may install, a function that a star import
+may bring, a package that an unknown one may depend on.
 """
 
 from __future__ import annotations

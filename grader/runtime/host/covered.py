@@ -33,7 +33,7 @@ def measure_lines(told: Mapping[str, Any]) -> Callable[[], None]:
     measured.start()
 
     def write() -> None:
-        # What it reads and writes then belongs to nobody's program, and neither does what goes wrong.
+        # What it reads and writes then belongs to no program, and neither does what goes wrong.
         with contextlib.suppress(Exception):
             measured.save()
 

@@ -41,9 +41,9 @@ def let_stop(told: Mapping[str, Any], program: str) -> None:
 def _debug_at(reads: TextIO, writes: TextIO, program: str) -> None:
     """Let all debuggers of the module `pdb` read from a terminal and write to it.
 
-    The standard streams of a program are no terminal: its output is recorded, and it has no input. Other processes use
-    the terminal as well, so it does not become that of this process, and Ctrl-C there reaches only whoever runs the
-    test.
+    The standard streams of a program are not a terminal: its output is recorded, and it has no input. Other processes
+    use the terminal as well, so it does not become that of this process, and Ctrl-C there reaches only whoever runs
+    the test.
     """
 
     class Debugger(pdb.Pdb):

@@ -66,7 +66,7 @@ class FlawKind(Enum):
     """What a build with colcon refuses or leaves out."""
 
     MANIFEST = "manifest"  # package.xml is not that of a ROS package
-    BUILD_TYPE = "build_type"  # it names no build type
+    BUILD_TYPE = "build_type"  # it does not name a build type
     NO_SETUP = "no_setup"  # there is no setup.py to build with
     PROJECT_NAME = "project_name"  # CMakeLists.txt has another name
     SETUP_NAME = "setup_name"  # setup.py has another name

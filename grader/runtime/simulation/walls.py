@@ -151,7 +151,7 @@ class Walls:
         return math.sqrt(float(np.min(dx * dx + dy * dy))) * map_.resolution
 
     def outlines(self) -> Iterator[tuple[Place, Place]]:
-        """Yield the edges between walls and what is no wall, as straight lines from one place to another."""
+        """Yield the edges between walls and everything else, as straight lines from one place to another."""
         yield from self._edges(across=False)
         yield from self._edges(across=True)
 
