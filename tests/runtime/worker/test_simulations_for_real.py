@@ -238,7 +238,7 @@ criteria:
     check: {stays_in_range: {topic: /truth/collisions, field: data, low: 1, after: 3 s}}
   - {id: lives, title: Lives, points: 1, scenario: alone, check: {no_fault: {}}}
 """
-DRIVER = """\
+IN_ROOM = """\
 import rclpy
 from geometry_msgs.msg import Twist
 from rclpy.node import Node
@@ -265,7 +265,7 @@ rclpy.spin(node)
 def test_a_robot_in_a_map_is_recorded_with_what_no_node_hears(tmp_path: Path) -> None:
     """The same twice, with its picture, which the page of the report shows with the same scale on both axes."""
     (tmp_path / "student").mkdir()
-    (tmp_path / "student" / "follow.py").write_text(DRIVER, encoding="utf-8")
+    (tmp_path / "student" / "follow.py").write_text(IN_ROOM, encoding="utf-8")
     (tmp_path / "follow.yaml").write_text(ROOM, encoding="utf-8")
     (tmp_path / "room.yaml").write_text("image: room.pgm\nresolution: 0.1\norigin: [-2, -2, 0]\n", encoding="utf-8")
     walls = "0 " * 40 + ("0 " + "1 " * 38 + "0 ") * 38 + "0 " * 40
