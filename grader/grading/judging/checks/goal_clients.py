@@ -186,14 +186,16 @@ class CancelsGoal:
         goals = sent_goals(trace, self.action)
         if not goals:
             return explain_no_goal(trace, self.action)
-        due = [(goal, due_ns) for goal in goals if (due_ns := self._due_ns(trace, goal)) is not None]
+        moments = [(goal, self._due_ns(trace, goal)) for goal in goals]
+        due = [(goal, due_ns) for goal, due_ns in moments if due_ns is not None]
         evidence: dict[str, object] = {"goals": len(goals), "due": len(due)}
-        early = self._early(trace, goals)
+        early = self._early(trace, moments)
         if early is not None:
             return not_met(early, evidence, problem=ProblemKind.TOO_EARLY)
         must = [(g, t) for g, t in due if g.cancels_ns or t + self.within < min(g.end_ns, trace.stop_ns)]
-        if len(must) < max(1, self.at_least):
-            return self._too_few(trace, len(must), evidence)
+        if len(must) < self.at_least or not must:
+            what = f"{self.action}: {counted(len(must), 'goal')} came to the moment to cancel"
+            return _too_few(trace, what, self.at_least, evidence)
         took = [Reading(g.t_ns, seconds(g.cancels_ns[0] - t) if g.cancels_ns else math.inf) for g, t in must]
         late_ns = self.within + LATENESS_NS[trace.clock]
         for goal, due_ns in must:
@@ -221,21 +223,14 @@ class CancelsGoal:
         due_ns = None if since_ns is None else since_ns + self.after
         return due_ns if due_ns is not None and due_ns <= goal.end_ns else None
 
-    def _early(self, trace: Trace, goals: Sequence[SentGoal]) -> str | None:
+    def _early(self, trace: Trace, moments: Sequence[tuple[SentGoal, int | None]]) -> str | None:
         """Describe a request to cancel that came before its moment; None if there is none."""
-        for goal in goals:
-            due_ns = self._due_ns(trace, goal)
+        for goal, due_ns in moments:
             for asked_ns in goal.cancels_ns[:1]:
                 if due_ns is None or asked_ns < due_ns - JITTER_NS[trace.clock]:
                     what = "the goal was cancelled too early"
                     return f"{moment(asked_ns)}, {self.action}: {what}; expected {self.expected}"
         return None
-
-    def _too_few(self, trace: Trace, found: int, evidence: dict[str, object]) -> Finding:
-        wanted = max(1, self.at_least)
-        reason = f"{self.action}: {counted(found, 'goal')} came to the moment to cancel, expected at least {wanted}"
-        crashed = explain_fault(trace, reason, evidence, last=True)
-        return crashed or not_met(reason, evidence, problem=ProblemKind.TOO_FEW)
 
     def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
         """Return the goals, with feedback and results."""
@@ -287,8 +282,9 @@ class AfterGoal:
         follow = {k: next((g for g in goals[k + 1 :] if g.t_ns >= one.end_ns), None) for k, one in ended}
         judged = [(k, g) for k, g in ended if follow[k] is not None or g.end_ns + late_ns < trace.stop_ns]
         evidence: dict[str, object] = {"goals": len(goals), "ends": [g.end for g in goals[:20]], "judged": len(judged)}
-        if len(judged) < max(1, self.at_least):
-            return self._too_few(trace, len(judged), evidence)
+        if len(judged) < self.at_least or not judged:
+            what = f"{self.action}: {counted(len(judged), 'goal')} {_was(self.end)} in time"
+            return _too_few(trace, what, self.at_least, evidence)
         took = [] if self.then == "nothing" else [Reading(g.end_ns, _took_s(g, follow[k])) for k, g in judged]
         for k, goal in judged:
             flaw = self._flaw(goal, follow[k], late_ns)
@@ -313,12 +309,6 @@ class AfterGoal:
             return f"another one was sent: {quote(str(dict(after.content)))}"
         return "the same one was sent again" if self.then == "next" and same else ""
 
-    def _too_few(self, trace: Trace, found: int, evidence: dict[str, object]) -> Finding:
-        wanted = max(1, self.at_least)
-        reason = f"{self.action}: {counted(found, 'goal')} {_was(self.end)} in time, expected at least {wanted}"
-        crashed = explain_fault(trace, reason, evidence, last=True)
-        return crashed or not_met(reason, evidence, problem=ProblemKind.TOO_FEW)
-
     def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
         """Return the goals, with feedback and results."""
         return Drawing(action=self.action)
@@ -331,6 +321,13 @@ def _took_s(goal: SentGoal, after: SentGoal | None) -> float:
 def _feedback(value: Mapping[str, object]) -> Mapping[str, object]:
     found = value.get("feedback")
     return found if isinstance(found, Mapping) else {}
+
+
+def _too_few(trace: Trace, what: str, at_least: int, evidence: dict[str, object]) -> Finding:
+    """Return that fewer goals than expected came so far, as a sentence says, or the fault that may be why."""
+    reason = f"{what}, expected at least {max(1, at_least)}"
+    crashed = explain_fault(trace, reason, evidence, last=True)
+    return crashed or not_met(reason, evidence, problem=ProblemKind.TOO_FEW)
 
 
 def _unless_crashed(trace: Trace, found: Finding, evidence: Mapping[str, object]) -> Finding:
