@@ -52,7 +52,8 @@ PARTS_OF_ACTIONS = {
     "cancel_goal": "action_msgs/srv/CancelGoal",
     "get_result": "{}_GetResult",
 }
-TOPICS_OF_ACTIONS = {"feedback": ("{}_FeedbackMessage", False), "status": ("action_msgs/msg/GoalStatusArray", True)}
+STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
+TOPICS_OF_ACTIONS = {"feedback": ("{}_FeedbackMessage", False), "status": (STATUS_TYPE, True)}
 
 
 class GoalState(IntEnum):
@@ -64,9 +65,6 @@ class GoalState(IntEnum):
     SUCCEEDED = 4
     CANCELED = 5
     ABORTED = 6
-
-
-STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 
 
 #: The codes of an answer to a request to cancel, as in action_msgs/srv/CancelGoal: of goals that are being cancelled,

@@ -68,11 +68,21 @@ class Worlds:
             only: What is drawn at all, of all that the seed draws.
         """
         folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
-        drawn: dict[str, Any] = {"drawn_order": seed is not None, "swarm": swarm, "only": only}
-        faults: dict[str, Any] = {"delay": delay, "lose": lose, "between": between}
-        watched: dict[str, Any] = {"measured": self.measured, "debugger": self.debugger}
-        options = {**drawn, **faults, **watched}
-        world = World(self.session, folders, clock=clock, seed=seed or 0, name=name, **options)
+        world = World(
+            self.session,
+            folders,
+            clock=clock,
+            seed=seed or 0,
+            name=name,
+            drawn_order=seed is not None,
+            swarm=swarm,
+            only=only,
+            delay=delay,
+            lose=lose,
+            between=between,
+            measured=self.measured,
+            debugger=self.debugger,
+        )
         world.updates_recordings = self.updates_recordings
         try:
             yield world

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, overload
@@ -99,7 +99,7 @@ def _of_function(function: Callable[..., Any]) -> Found:
 def _of_package(package: str, name: str, near: Sequence[Path]) -> Found:
     known: list[str] = []
     ignored: dict[str, Path] = {}
-    for root, projects in dict.fromkeys((*map(_surroundings, near), *map(_below, near))):
+    for root, projects in _workspaces(near):
         for one in find_executables(root, projects, package, name):
             if one.file is not None:
                 return Found(one.words, root, one.file, one.name if one.target else "", projects)
@@ -165,10 +165,15 @@ def find_launch_file(wanted: str | os.PathLike[str], near: Sequence[Path]) -> tu
     return found, (*((file, name) for file, name in known if file), *loose)
 
 
+def _workspaces(near: Sequence[Path]) -> Iterable[tuple[Path, tuple[Project, ...]]]:
+    """Return the workspaces around some folders, and those below them, with their packages: each once."""
+    return dict.fromkeys((*map(_surroundings, near), *map(_below, near)))
+
+
 def _launch_file_of(package: str, name: str, near: Sequence[Path]) -> Found:
     """Return the launch file of a package that has a name, in any of its folders, as `ros2 launch` finds it."""
     packages: set[str] = set()
-    for root, projects in dict.fromkeys((*map(_surroundings, near), *map(_below, near))):
+    for root, projects in _workspaces(near):
         packages |= {project.name for project in projects}
         for project in (one for one in projects if one.name == package):
             files = sorted(

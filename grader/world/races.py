@@ -107,7 +107,7 @@ def shrink(first: Rerun, others: Iterable[int] = ()) -> Shrinking:
     search = _Search(_naming(first))
     if not (yield from search.holds((), ())):
         yield from search.fewest()
-        return Shrunk(search.best, _nearest(search.best, search.runs.values(), failed=False), len(search.runs))
+        return Shrunk(search.best, _nearest(search.best, search.runs.values()), len(search.runs))
     bare, runs = search.best, len(search.runs)
     for seed in others:
         attempt = yield RunDraws(seed=seed)
@@ -119,10 +119,10 @@ def shrink(first: Rerun, others: Iterable[int] = ()) -> Shrinking:
     return Shrunk(bare, None, runs)
 
 
-def _nearest(attempt: Rerun, others: Iterable[Rerun], *, failed: bool) -> Rerun | None:
-    """Return the run that is the same for the longest time, of those that have failed, or have not."""
+def _nearest(attempt: Rerun, others: Iterable[Rerun]) -> Rerun | None:
+    """Return the run that passes and is the same for the longest time; None if none passes."""
     events = _events(attempt.steps)
-    found = [one for one in others if one.failed is failed]
+    found = [one for one in others if not one.failed]
     return max(found, key=lambda one: _common(events, _events(one.steps)), default=None)
 
 

@@ -264,6 +264,7 @@ class World:
         self._failing: list[tuple[Program, Fault]] = []
         self._simulations: list[Simulation] = []
         self._authored: list[tuple[str, str]] = []  # name and file of each, if it is one of a rubric's own
+        self._outputs: list[Mapping[str, str]] = []  # the topics of each, with their types
         self._fits = True  # whether nothing has changed since it was looked at whether types and QoS fit
         self._mismatches: set[str] = set()
         self.left_out: list[str] = []
@@ -896,6 +897,7 @@ class World:
         self._asked(number, "begin", draw)
         publishes, serves, records = (dict(self._asked(number, key)) for key in ("publishes", "serves", "records"))
         hears = types_heard(self._asked(number, "hears"))
+        self._outputs.append({**publishes, **records})
         self._fits = False
         self._perform(Simulate(number, simulation.period, publishes, hears, serves, records))
         return simulation
@@ -936,19 +938,16 @@ class World:
     def _checked(self, number: int, method: str, answer: Any) -> Any:
         """Return what a simulation publishes; raises SimulationError for anything but a message of its topics."""
         simulation, (name, path) = self._simulations[number], self._authored[number]
-        types = {**simulation.publishes(), **simulation.records()} if path and isinstance(answer, list) else {}
+        types = self._outputs[number] if path and isinstance(answer, list) else {}
         try:
             for output in answer if types else ():
                 topic, fields = output
                 built(wanted_class(types[topic], "msg", topic), fields, topic)
         except (HarnessError, TypeError, ValueError, KeyError, AttributeError) as error:
+            among = f"one of its topics ({', '.join(types)}) with the fields of a message"
             found = (
-                error.message
-                if isinstance(error, HarnessError)
-                else f"{printable(str(output), 80)}, expected one of its "
+                error.message if isinstance(error, HarnessError) else f"{printable(str(output), 80)}, expected {among}"
             )
-            if not isinstance(error, HarnessError):
-                found += f"topics ({', '.join(types)}) with the fields of a message"
             text = f"the simulation `{name}` failed in {method}(): {found}"
             raise SimulationError(AuthorMistake(path, begin_of(simulation, method, path), text)) from error
         return answer
@@ -1004,9 +1003,8 @@ class World:
             NoTransform: The frames are in no tree together; the message names the link that is missing.
         """
         __tracebackhide__ = True
-        self._catch_up()
-        sent = sorted((one for topic in TRANSFORMS for one in self._messages.get(topic, ())), key=lambda one: one.t_ns)
-        links = last_links([self._as_object(one) for one in sent])
+        sent = sorted((one for topic in TRANSFORMS for one in self.received(topic)), key=lambda one: one.t)
+        links = last_links([one.message for one in sent])
         return transform_between(links, target.lstrip("/"), source.lstrip("/"))
 
     @_with_hint

@@ -139,8 +139,7 @@ class Inbox:
         kept = self._kept.setdefault(subscription, deque(maxlen=_depth(subscription)))
 
         def take() -> None:
-            with subscription.handle:
-                found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+            found = taken_from(subscription)
             if found is not None:
                 kept.append(found)
 
@@ -192,8 +191,7 @@ class Inbox:
                     if context is None or not self._await_ready(subscription, context):
                         self.lost[channel_name(subscription)] += 1
                         continue
-                    with subscription.handle:
-                        found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+                    found = taken_from(subscription)
                     if found is not None and is_kept:
                         waiting.append(found)
 
@@ -217,6 +215,12 @@ class Inbox:
 def channel_name(receiver: Any) -> str:
     """Return the name of the topic or service of a subscription, a client or a server."""
     return str(receiver.topic_name) if hasattr(receiver, "topic_name") else service_name(receiver)
+
+
+def taken_from(subscription: Any) -> Any:
+    """Take the next message of a subscription with its information; None if there is none."""
+    with subscription.handle:
+        return subscription.handle.take_message(subscription.msg_type, subscription.raw)
 
 
 def _depth(receiver: Any) -> int:

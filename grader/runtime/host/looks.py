@@ -105,7 +105,7 @@ def _note_found(ros: RosState, cls: Any, name: str) -> None:
     def looked(self: Any, *args: Any, **kwargs: Any) -> Any:
         found = look(self, *args, **kwargs)
         if isinstance(self, rclpy.client.Client):
-            ros.note(f"{'finds' if found else 'misses'} request {service_name(self)}")
+            ros.note(lambda: f"{'finds' if found else 'misses'} request {service_name(self)}")
         if found:
             ros.outbox.note_waited()
         return found

@@ -48,10 +48,10 @@ class ReadyOrder:
         """Whether anything may be drawn in this run; otherwise every look finds all that is ready."""
         return bool(self._seed)
 
-    def note(self, what: str) -> None:
-        """Note something that the program does, for the next report."""
+    def note(self, what: Callable[[], str]) -> None:
+        """Note something that the program does, for the next report: a text that is made only where order is drawn."""
         if self._seed and len(self.did) < MOST_DONE:
-            self.did.append(what)
+            self.did.append(what())
 
     def told(self) -> tuple[list[str], bool]:
         """Return what was noted since the last call, and whether a look since then has found less than was ready."""

@@ -22,7 +22,7 @@ class RosState(NamedTuple):
     inbox: Inbox  # what is on its way to this process, or was taken ahead of time
     graph: SeenGraph  # whether this process sees the counterparts that the grader expects
     events: Events  # what the program is told of its counterparts
-    note: Callable[[str], None]  # notes what the program does, as `order.ReadyOrder.note`
+    note: Callable[[Callable[[], str]], None]  # notes what the program does, as `order.ReadyOrder.note`
 
     @property
     def sending_and_removed(self) -> bool:
@@ -30,7 +30,7 @@ class RosState(NamedTuple):
         return self.endpoints.removed and self.outbox.sending
 
 
-def new_ros_state(note: Callable[[str], None]) -> RosState:
+def new_ros_state(note: Callable[[Callable[[], str]], None]) -> RosState:
     """Return the state of a process that has no node yet.
 
     Args:

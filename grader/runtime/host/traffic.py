@@ -17,7 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from .actions import Counted, install_actions
 from .clock import VirtualClock
 from .endpoints import BACKGROUND, service_name
-from .inbox import channel_name
+from .inbox import channel_name, taken_from
 from .lifetimes import install_departures, install_endpoints
 from .ros_state import RosState
 
@@ -62,7 +62,7 @@ def install_traffic(  # noqa: PLR0913 - all that the traffic depends on
         # Time stands still while a program runs: one that only sends would never get further.
         clock.busy_sending()
         early = ros.outbox.early[name]
-        ros.note(f"sends {name}")
+        ros.note(lambda: f"sends {name}")
         ros.outbox.note_sent(name, handle, work_ns())
         try:
             return send()
@@ -114,7 +114,7 @@ def _note_timers(ros: RosState) -> None:
 
     @functools.wraps(take)
     def noted(self: Any, timer: Any) -> Any:
-        ros.note("timer")
+        ros.note(lambda: "timer")
         return take(self, timer)
 
     rclpy.executors.Executor._take_timer = noted
@@ -153,7 +153,9 @@ def _counting_take(name: str, ros: RosState, clock: VirtualClock, settle: Callab
 
     def counted_take(self: Any, receiver: Any) -> Any:
         clock.busy()
-        ros.note(f"reads {TAKEN[name]} {channel_name(receiver)}")
+        # One that was destroyed since it was ready has no name, and nothing is taken from it.
+        with contextlib.suppress(_rclpy.InvalidHandle):
+            ros.note(lambda: f"reads {TAKEN[name]} {channel_name(receiver)}")
         # What the process itself has sent since may push out what is kept: the queue is the same as without the grader
         # only once that has arrived.
         if name == "_take_subscription" and _may_be_pushed_out(ros, receiver):
@@ -183,8 +185,8 @@ def _takes_message_only(subscription: Any) -> bool:
 
 def _taken_with_info(subscription: Any, clock: VirtualClock) -> Callable[[], Any] | None:
     """Take a message for a callback that also wants its times, as an executor does."""
-    with contextlib.suppress(_rclpy.InvalidHandle), subscription.handle:
-        found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    with contextlib.suppress(_rclpy.InvalidHandle):
+        found = taken_from(subscription)
         if found is not None:
             return _handing_over(subscription, found, clock)
     return None

@@ -429,12 +429,11 @@ class Core(Generic[P]):
             if kind == "topic":
                 writers = claims_of(sender.claims, "publisher", name)
                 self.kept[sender.name, name] += count if any(w.qos.latched for w in writers) else 0
-                for process in self.processes:
-                    if any(compatible(w, r) for w in writers for r in readers_of(process.claims, name)):
-                        if name in self._held and process is not sender and channel not in process.unmatched:
-                            self.withheld.append((process, name, count))
-                        else:
-                            announce(process, channel, count)
+                for process in hearers(self.processes, writers, name):
+                    if name in self._held and process is not sender and channel not in process.unmatched:
+                        self.withheld.append((process, name, count))
+                    else:
+                        announce(process, channel, count)
             elif kind in ("request", "response"):
                 self.exchanged(kind, name, count, senders(sender, channel))
 
@@ -479,6 +478,11 @@ def announce(process: Process, channel: str, count: int) -> None:
     """Add messages to those that are on their way to a process, unless its end of the channel has no counterpart."""
     if channel not in process.unmatched:
         process.arrivals[channel] = process.arrivals.get(channel, 0) + count
+
+
+def hearers(processes: Iterable[P], writers: Sequence[Claim], topic: str) -> list[P]:
+    """Return the processes that subscribe to a topic with a QoS that fits one of its publishers."""
+    return [one for one in processes if any(compatible(w, r) for w in writers for r in readers_of(one.claims, topic))]
 
 
 def senders(process: Process, channel: str) -> Sequence[Claim]:

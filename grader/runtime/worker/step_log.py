@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from grader.runtime.host.protocol import Claim
 from grader.runtime.model.step_event import ProgramStep, StepEvent
-from grader.runtime.worker.claims import claims_of, compatible, readers_of
-from grader.runtime.worker.core import Process
+from grader.runtime.worker.claims import claims_of
+from grader.runtime.worker.core import Process, hearers
 
 #: The most steps that are kept; a race shows in the first ones that differ.
 MOST_STEPS = 50_000
@@ -41,14 +41,14 @@ class StepLog:
         if len(self._steps) < MOST_STEPS:
             self._steps.append(ProgramStep(t_ns, process.name, name, deviates, ()))
 
-    def told(self, t_ns: int, process: Process, did: Iterable[str], before: Iterable[Claim], *, drew: bool) -> None:
+    def told(self, t_ns: int, process: Process, did: Iterable[str], before: Sequence[Claim], *, drew: bool) -> None:
         """Note what a process reports: what it has done, and what it offers now and has not before.
 
         It may have let time pass on its own since the step began.
         """
-        known = [*before]
-        for claim in process.claims:
-            if claim not in known and claim.kind in _SHOWN:
+        # Claims are replaced as a whole, and seldom.
+        for claim in process.claims if process.claims is not before else ():
+            if claim.kind in _SHOWN and claim not in before:
                 self._events.append(StepEvent(self._name(process), "offers", f"{claim.kind} {claim.name}"))
         for one in did:
             verb, _, channel = one.partition(" ")
@@ -92,8 +92,6 @@ class StepLog:
 
     def _receivers(self, sender: Process, channel: str) -> list[Process]:
         kind, _, name = channel.partition(" ")
-        others = [process for process in self._processes if not process.ended]
         if kind == "topic":
-            writers = claims_of(sender.claims, "publisher", name)
-            return [p for p in others if any(compatible(w, r) for w in writers for r in readers_of(p.claims, name))]
-        return [p for p in others if claims_of(p.claims, "service" if kind == "request" else "client", name)]
+            return hearers(self._processes, claims_of(sender.claims, "publisher", name), name)
+        return [p for p in self._processes if claims_of(p.claims, "service" if kind == "request" else "client", name)]

@@ -11,7 +11,7 @@ from grader.runtime.model.quantities import NS_PER_MS, NS_PER_S, seconds
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.step_event import ProgramStep
 from grader.runtime.model.trace import ClockKind, Endpoint, Observation, unmet_policy
-from grader.runtime.plan import InjectedFault, Plan, PlannedConnection, derive
+from grader.runtime.plan import Plan, PlannedConnection, derive
 from grader.runtime.stimuli.messages import PlannedMessages
 from grader.runtime.worker.core import Core, RunProcess, announce
 from grader.runtime.worker.observer import Observer
@@ -60,6 +60,8 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
     ) -> None:
         super().__init__(plan, students, observer, start, ask)
         self._log = StepLog(students)
+        #: The steps in which the order is drawn; None for all.
+        self._drawn = None if plan.drawn_steps is None else frozenset(plan.drawn_steps)
         #: How a process is late to hear of a topic, or loses its messages.
         self._ways: dict[tuple[str, str], Transit] = {}
         #: The number of the step of each program before which it is paused, and for how long.
@@ -76,12 +78,8 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
         """Return what each program has done so far."""
         return self._log.steps()
 
-    def _on_topics_faults(self, topic: str) -> list[InjectedFault]:
-        return [one for one in self._plan.faults if one.on == topic and one.kind in ("delay", "lose")]
-
     def _draws(self) -> bool:
-        chosen = self._plan.drawn_steps
-        return self._plan.drawn_order and (chosen is None or self._core.step in chosen)
+        return self._plan.drawn_order and (self._drawn is None or self._core.step in self._drawn)
 
     def _step(self, run: RunProcess[NodeProcess]) -> None:
         process, now_ns = run.process, self._core.now_ns
@@ -109,7 +107,7 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
         """Let a process take messages that do not arrive at once, and hold or lose them."""
         now_ns = self._core.now_ns
         if (process.name, topic) not in self._ways:
-            late = {one.kind: one for one in self._on_topics_faults(topic)}
+            late = {one.kind: one for one in self._plan.faults if one.on == topic}
             delay, lose = late.get("delay"), late.get("lose")
             delay_ns = (delay.least_ns, delay.most_ns) if delay else (0, 0)
             # of its own for each process that hears the topic; the faults of a topic follow from one seed
@@ -161,10 +159,8 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
         self._core.arrive(early=bool(self._recorder.full) or is_enough())
 
     def _make_core(self) -> Core[NodeProcess]:
-        seed, held = (
-            int(self._plan.host_seed, 16),
-            {one.on for one in self._plan.faults if one.kind in ("delay", "lose")},
-        )
+        seed = int(self._plan.host_seed, 16)
+        held = {one.on for one in self._plan.faults if one.on.startswith("/")}
 
         def choose(step: str, found: Sequence[NodeProcess]) -> NodeProcess:
             # of its own for each step, so that what one draws does not depend on whether an earlier one has drawn

@@ -140,7 +140,7 @@ class SteppedRunner(Runner):
             case Kill():
                 self._kill(self._named(command.process))
             case ReadSteps():
-                return {"steps": [[*one[:-1], [[*event] for event in one.events]] for one in self.steps()]}
+                return {"steps": self.steps()}
         return {}
 
     def news(self) -> list[Observation]:
