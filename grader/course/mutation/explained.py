@@ -7,7 +7,7 @@ from dataclasses import field
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
@@ -20,6 +20,7 @@ from grader.grading.rubrics.mistakes import (
     mistakes_of,
     nearest_hint,
     read_yaml,
+    refused,
 )
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
@@ -101,10 +102,10 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
     try:
         read = _File.model_validate(tree.data or {})
     except ValidationError as error:
-        _refuse(path, [*tree.mistakes, *mistakes_of(error, tree, _File)])
+        raise refused(path, [*tree.mistakes, *mistakes_of(error, tree, _File)]) from None
     mistakes = [*tree.mistakes, *_unknown_criteria(read, tree, exercise)]
     if mistakes:
-        _refuse(path, mistakes)
+        raise refused(path, mistakes)
 
     def where(*at: str | int) -> str:
         place = tree.values[at]
@@ -138,13 +139,7 @@ def _tree(path: Path) -> YamlTree:
     except UnicodeDecodeError:
         raise RubricError(f"{where}: expected UTF-8 text, found another encoding", "save the file as UTF-8") from None
     except YamlSyntaxError as error:
-        _refuse(path, [error.mistake])
-
-
-def _refuse(path: Path, mistakes: Sequence[Mistake]) -> NoReturn:
-    where, ordered = printable(str(path), 500), sorted(set(mistakes))
-    lines = [f"{where}:{m.line}:{m.column}: {m.text}" for m in ordered]
-    raise RubricError("\n".join(lines), next((m.hint for m in ordered if m.hint), ""))
+        raise refused(path, [error.mistake]) from None
 
 
 def _unknown_criteria(read: _File, tree: YamlTree, exercise: Exercise) -> Iterator[Mistake]:

@@ -19,9 +19,9 @@ _MOST_NUMBERS = 20
 def in_proportion(criterion: Criterion, finding: Finding) -> Finding:
     """Return the finding on one recording with the share of the points for its numbers; as it is without numbers."""
     measure, scale = measure_of(criterion.check), criterion.scale
-    values = [reading.value for reading in finding.readings]
-    if measure is None or scale is None or not values:
+    if measure is None or scale is None or not (readings := finding.readings):
         return finding
+    values = [reading.value for reading in readings]
     value = scale.combined(values)
     which = "" if len(values) == 1 else f" ({_words(scale)} of {len(values)})"
     said = f"{measure.name} {measure.written(value)}{which}; {_limits(measure, scale)}"

@@ -305,7 +305,7 @@ class _Checked:
             for key, _, part in stimulus.becomes.holds:
                 type_ = f"{getattr(stimulus, 'type', '')}{part and f'_{part}'}"
                 if (*path, key) in self._tree.values and self._interfaces.fields(type_) is not None:
-                    raw = self._raw((*path, key))
+                    raw = self._tree.raw((*path, key))
                     each = [((*path, key), raw)] if isinstance(raw, Mapping) else _cases(raw, (*path, key))
                     yield from (m for place, value in each for m in self._in_message(value, type_, place))
 
@@ -332,12 +332,6 @@ class _Checked:
                 elif isinstance(item, Mapping) or (isinstance(item, _PLAIN) and not _fits(item, field.item(name))):
                     return f"what it publishes on {where} has {found(item)} in `{name}`, expected {field.words}"
         return ""
-
-    def _raw(self, path: TreePath) -> Any:
-        here = self._tree.data
-        for part in path:
-            here = here[part]  # type: ignore[index]
-        return here
 
     def _in_message(self, value: Mapping[str, object], type_: str, path: TreePath) -> Iterator[Mistake]:
         known = self._interfaces.fields(type_) or {}

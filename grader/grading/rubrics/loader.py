@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -582,10 +582,9 @@ def _criteria(rubric: RubricShape, tree: YamlTree, mistakes: list[Mistake]) -> I
         name, parameters = shape.check.chosen
         if flaw := parameters.scale_flaw():
             key, expected = flaw
-            written: Any = tree.data
-            for step in (path := ("criteria", index, "check", name, key)):
-                written = written[step]
-            mistakes.append(tree.at(path).mistake(f"expected {expected}, found {key}: {printable(str(written), 40)}"))
+            path = ("criteria", index, "check", name, key)
+            found = printable(str(tree.raw(path)), 40)
+            mistakes.append(tree.at(path).mistake(f"expected {expected}, found {key}: {found}"))
         try:
             check: Check = plain_value(parameters)
         except ValueError as error:

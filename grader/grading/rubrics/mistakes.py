@@ -5,12 +5,14 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from grader.grading.rubrics.yaml_tree import Mistake, TreePath, YamlSyntaxError, YamlTree, nearest_position, read_yaml
+from grader.runtime.model.errors import RubricError
 from grader.runtime.model.wording import listed, printable
 
 __all__ = [
@@ -131,3 +133,10 @@ def _first(annotation: object, wanted: Callable[[object], bool]) -> Any:
         return annotation
     annotation = getattr(annotation, "__value__", annotation)  # an alias of a type
     return next((hit for inner in get_args(annotation) if (hit := _first(inner, wanted))), None)
+
+
+def refused(path: Path, mistakes: Iterable[Mistake]) -> RubricError:
+    """Return the error with the mistakes of a file, in their order, each once, and the first hint."""
+    where, ordered = printable(str(path), 500), sorted(set(mistakes))
+    lines = [f"{where}:{one.line}:{one.column}: {one.text}" for one in ordered]
+    return RubricError("\n".join(lines), next((one.hint for one in ordered if one.hint), ""))

@@ -6,7 +6,7 @@ import random
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import field
-from functools import partial
+from functools import lru_cache, partial
 from itertools import islice
 from typing import Any
 
@@ -57,8 +57,12 @@ def simulated_in(rubric: RubricShape) -> Iterator[tuple[TreePath, Simulated]]:
                 yield ("scenarios", index, "stimuli", number, Simulated.key, chosen.chosen[0]), plain_value(chosen)
 
 
+@lru_cache(maxsize=32)
 def offered(simulated: Simulated) -> Offered:
-    """Try a simulation with the first value that each parameter may have; raises HarnessError if it fails."""
+    """Try a simulation with the first value that each parameter may have; raises HarnessError if it fails.
+
+    Once for all draws of a scenario, which have the same simulation.
+    """
     parameters = {name: _first(spec) for name, spec in simulated.parameters.items()}
     one = made_simulation(simulated.name, simulated.path, simulated.content, parameters, dict(simulated.maps))
     call = partial(guarded, simulated.name, simulated.path)

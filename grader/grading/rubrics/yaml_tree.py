@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import field
-from typing import cast
+from typing import Any, cast
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, StreamMark, YAMLError
@@ -64,6 +64,13 @@ class YamlTree:
     texts: dict[TreePath, str] = field(default_factory=dict)
     # Invalid parts: duplicate keys, keys that are not text, unknown tags
     mistakes: list[Mistake] = field(default_factory=list)
+
+    def raw(self, path: TreePath) -> Any:
+        """Return a value as it was read, which has to be there."""
+        here: Any = self.data
+        for part in path:
+            here = here[part]
+        return here
 
     def at(self, path: TreePath) -> Position:
         """Return the position of a value; the top of the file if it is not there."""

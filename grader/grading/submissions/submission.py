@@ -13,12 +13,11 @@ from types import MappingProxyType
 
 from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.contents import SubmissionContents, read_contents
-from grader.grading.submissions.installing import examined_packages
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.staging import collect_folder, read_start, write_files
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.limits import MAX_ARCHIVE_BYTES, MAX_FILE_BYTES
-from grader.runtime.model.projects import Project
+from grader.runtime.model.projects import ExaminedPackage, Project
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.runtime.model.wording import first_of, listed, printable
 from grader.runtime.programs.executables import Executable, executables, find_executables
@@ -119,6 +118,12 @@ def stage_collected(
         for name in wanted
     }
     several = tuple(note for file in files.values() for note in _notes_on(file))
+    packages: tuple[ExaminedPackage, ...] = ()
+    if projects:
+        # Most submissions have no package, and do not wait for it to be imported.
+        from grader.grading.submissions.installing import examined_packages  # noqa: PLC0415
+
+        packages = examined_packages(projects, (name for name, _ in collected.files), contents.programs)
     return Submission(
         name=_name(Path(path)),
         path=path,
@@ -127,7 +132,7 @@ def stage_collected(
         files=files,
         notes=(*several, *_unrunnable(files.values(), projects), *collected.notes, *contents.notes),
         projects=_meant_first(projects, files.values()),
-        packages=examined_packages(projects, (name for name, _ in collected.files), contents.programs),
+        packages=packages,
         programs=contents.programs,
     )
 

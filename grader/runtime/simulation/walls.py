@@ -40,6 +40,8 @@ class Rays:
         count: Number of rays.
         x: The part of each direction along x.
         y: The part of each direction along y.
+        slow_x: How far each ray goes while it goes 1 m along x.
+        slow_y: The same along y.
     """
 
     def __init__(self, heading: float, first: float, increment: float, count: int) -> None:
@@ -50,6 +52,7 @@ class Rays:
         cosine, sine = math.cos(heading), math.sin(heading)
         self.x: Numbers = np.asarray(cosine * cosines - sine * sines)
         self.y: Numbers = np.asarray(sine * cosines + cosine * sines)
+        self.slow_x, self.slow_y = _inverse(self.x), _inverse(self.y)
 
 
 @lru_cache(maxsize=8)
@@ -108,8 +111,8 @@ class Walls:
         cells, numbers = self._met(to_x + 0.5, to_y + 0.5, rays)
         enters, leaves = _slab(
             (to_x[cells], to_y[cells], to_x[cells] + 1.0, to_y[cells] + 1.0),
-            _inverse(rays.x)[numbers],
-            _inverse(rays.y)[numbers],
+            rays.slow_x[numbers],
+            rays.slow_y[numbers],
         )
         met = (enters <= leaves) & (leaves > 0)
         np.minimum.at(found, numbers[met], np.maximum(enters[met], 0.0))
@@ -183,7 +186,7 @@ def ranges_to_box(x: float, y: float, rays: Rays, box: tuple[float, float, float
     import numpy as np  # noqa: PLC0415 - see the top
 
     least_x, least_y, most_x, most_y = box
-    enters, leaves = _slab((least_x - x, least_y - y, most_x - x, most_y - y), _inverse(rays.x), _inverse(rays.y))
+    enters, leaves = _slab((least_x - x, least_y - y, most_x - x, most_y - y), rays.slow_x, rays.slow_y)
     return np.where((enters <= leaves) & (leaves > 0), np.maximum(enters, 0.0), math.inf)
 
 

@@ -71,8 +71,9 @@ class ReachesGoal:
         if not goals:
             return _cut_short(trace, f"{self.goals}: no goal was observed for {span(self.within)}")
         jitter_ns = JITTER_NS[trace.clock]
-        wrong = [(goal, flaw) for goal in goals if (flaw := self._flaw(goal, jitter_ns))]
-        measured = [Reading(goal.t_ns, self._took_s(goal, jitter_ns)) for goal in goals]
+        told = [(goal, self._flaw(goal, jitter_ns)) for goal in goals]
+        wrong = [(goal, flaw) for goal, flaw in told if flaw]
+        measured = [Reading(goal.t_ns, math.inf if flaw else self._took_s(goal)) for goal, flaw in told]
         nearest = [min(g.distances) for g in goals]
         evidence: dict[str, object] = {"goals": len(goals), "missed": len(wrong), "nearest": nearest[:10]}
         if not wrong:
@@ -86,10 +87,8 @@ class ReachesGoal:
         known = evidence | {"first_missed_s": seconds(wrong[0][0].t_ns)}
         return not_met(reason, known, problem=ProblemKind.WRONG_VALUE, measured=measured)
 
-    def _took_s(self, goal: _Goal, jitter_ns: int) -> float:
-        """Return how long the robot took to a goal, to stay if it has to; infinite if it missed it."""
-        if self._flaw(goal, jitter_ns):
-            return math.inf
+    def _took_s(self, goal: _Goal) -> float:
+        """Return how long the robot took to a goal that it has reached, to stay if it has to."""
         near = [(s.t_ns, d <= self.tolerance + _EDGE) for s, d in zip(goal.states, goal.distances, strict=True)]
         arrived = next(t_ns for t_ns, is_near in near if is_near)
         if self.stays:

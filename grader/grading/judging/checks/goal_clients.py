@@ -10,7 +10,6 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 from grader.grading.judging.findings import explain_fault, faulted, first_fault, met, not_met, observed
-from grader.grading.judging.plots import Drawing
 from grader.grading.judging.service_calls import LATENESS_NS, Call, calls_of, status_of
 from grader.grading.judging.values import JITTER_NS, RuleOrValue, breach, broken_rules, delivered, rules_text, value_at
 from grader.grading.model.exercise import Finding, ProblemKind
@@ -123,8 +122,7 @@ class SendsGoals:
         evidence: dict[str, object] = {"goals": [dict(goal.content) for goal in goals[:10]], "count": len(goals)}
         flawed = self._content_flaw(goals, evidence) or self._count_flaw(goals, evidence)
         if flawed is not None:
-            fault = first_fault(trace)
-            return flawed if fault is None else faulted(fault, flawed.reason, evidence, last=True)
+            return _unless_crashed(trace, flawed, evidence)
         return met(f"{self.action}: {counted(len(goals), 'goal')}, as expected", evidence)
 
     def _content_flaw(self, goals: Sequence[SentGoal], evidence: dict[str, object]) -> Finding | None:
@@ -148,10 +146,6 @@ class SendsGoals:
         most = "" if self.at_most is None else f" and at most {self.at_most}"
         reason = f"{self.action}: {counted(len(goals), 'goal')}, expected at least {self._least}{most}"
         return not_met(reason, evidence, problem=problem)
-
-    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
-        """Return the goals, with feedback and results."""
-        return Drawing(action=self.action)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,10 +226,6 @@ class CancelsGoal:
                     return f"{moment(asked_ns)}, {self.action}: {what}; expected {self.expected}"
         return None
 
-    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
-        """Return the goals, with feedback and results."""
-        return Drawing(action=self.action)
-
 
 #: What follows a goal, in words.
 _SAID = {"same": "the same goal again", "next": "another goal", "goal": "a goal", "nothing": "no goal"}
@@ -309,10 +299,6 @@ class AfterGoal:
             return f"another one was sent: {quote(str(dict(after.content)))}"
         return "the same one was sent again" if self.then == "next" and same else ""
 
-    def drawing(self, trace: Trace) -> Drawing:  # noqa: ARG002 - as every check
-        """Return the goals, with feedback and results."""
-        return Drawing(action=self.action)
-
 
 def _took_s(goal: SentGoal, after: SentGoal | None) -> float:
     return math.inf if after is None else seconds(after.t_ns - goal.end_ns)
@@ -326,8 +312,7 @@ def _feedback(value: Mapping[str, object]) -> Mapping[str, object]:
 def _too_few(trace: Trace, what: str, at_least: int, evidence: dict[str, object]) -> Finding:
     """Return that fewer goals than expected came so far, as a sentence says, or the fault that may be why."""
     reason = f"{what}, expected at least {max(1, at_least)}"
-    crashed = explain_fault(trace, reason, evidence, last=True)
-    return crashed or not_met(reason, evidence, problem=ProblemKind.TOO_FEW)
+    return _unless_crashed(trace, not_met(reason, evidence, problem=ProblemKind.TOO_FEW), evidence)
 
 
 def _unless_crashed(trace: Trace, found: Finding, evidence: Mapping[str, object]) -> Finding:

@@ -418,19 +418,20 @@ class Reaction:
             return self._untried(trace, missing)
         if not outputs and not all(a.case.silent for a in asked):
             return self._silent(trace)
-        wrong = [(a, flaw) for a in asked if (flaw := self._wrong(trace, a))]
+        told = [(a, self._wrong(trace, a)) for a in asked]
+        wrong = [(a, flaw) for a, flaw in told if flaw]
         evidence: dict[str, object] = {"inputs": len(asked), "outputs": len(outputs), "wrong": len(wrong)}
-        measured = [Reading(a.given.t_ns, self._took_s(trace, a)) for a in asked if not a.case.silent]
+        # infinite where the right message did not come, or another one followed
+        took = [(a, math.inf if flaw else self._took_s(a)) for a, flaw in told if not a.case.silent]
+        measured = [Reading(a.given.t_ns, took_s) for a, took_s in took]
         if wrong:
             found = self._explain(trace, wrong, len(asked), evidence)
             return found if FAULT_KEY in found.evidence else replace(found, measured=measured)
         reason = f"{self.output}: right after each of {counted(len(asked), 'input')} on {self.input}"
         return met(reason, evidence, measured=measured)
 
-    def _took_s(self, trace: Trace, asked: _Asked) -> float:
-        """Return how long the right message took; infinite if it did not come, or another one followed."""
-        if self._wrong(trace, asked):
-            return math.inf
+    def _took_s(self, asked: _Asked) -> float:
+        """Return how long the right message took, which has come."""
         rules = asked.case.rules(asked.given.value)
         first = next(o for o in asked.outputs if not broken_rules(o.value, rules, self.tolerance))
         return seconds(max(0, first.t_ns - asked.given.t_ns))
