@@ -20,7 +20,7 @@ from grader.grading.rubrics.mistakes import (
     mistakes_of,
     nearest_hint,
     read_yaml,
-    refused,
+    refused_file,
 )
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RubricError
@@ -102,10 +102,10 @@ def read_explained(path: Path, exercise: Exercise) -> Explained:
     try:
         read = _File.model_validate(tree.data or {})
     except ValidationError as error:
-        raise refused(path, [*tree.mistakes, *mistakes_of(error, tree, _File)]) from None
+        raise refused_file(path, [*tree.mistakes, *mistakes_of(error, tree, _File)]) from None
     mistakes = [*tree.mistakes, *_unknown_criteria(read, tree, exercise)]
     if mistakes:
-        raise refused(path, mistakes)
+        raise refused_file(path, mistakes)
 
     def where(*at: str | int) -> str:
         place = tree.values[at]
@@ -139,7 +139,7 @@ def _tree(path: Path) -> YamlTree:
     except UnicodeDecodeError:
         raise RubricError(f"{where}: expected UTF-8 text, found another encoding", "save the file as UTF-8") from None
     except YamlSyntaxError as error:
-        raise refused(path, [error.mistake]) from None
+        raise refused_file(path, [error.mistake]) from None
 
 
 def _unknown_criteria(read: _File, tree: YamlTree, exercise: Exercise) -> Iterator[Mistake]:

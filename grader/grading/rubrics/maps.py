@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.grading.rubrics.map_images import MapImage, NoImage, read_image
-from grader.grading.rubrics.mistakes import nearest_hint, refused
+from grader.grading.rubrics.mistakes import nearest_hint, refused_file
 from grader.grading.rubrics.own_checks import OwnFile, beside_file, own_files
 from grader.grading.rubrics.yaml_tree import YamlSyntaxError, YamlTree, read_yaml
 from grader.runtime.model.errors import RubricError
@@ -39,7 +39,7 @@ def map_files(rubric: Path, names: Sequence[str], never_in: Sequence[Path] = ())
         if not (isinstance(image, str) and _IMAGE.fullmatch(image)):
             said = "none" if image is None else f"`{printable(str(image))}`"
             mistake = tree.at(("image",)).mistake(f"expected `image`, a .pgm or .png file beside it, found {said}")
-            raise refused(file.path, [mistake])
+            raise refused_file(file.path, [mistake])
         name = (Path(file.name).parent / image).as_posix()
         where = f"{printable(str(file.path), 500)}:{tree.at(('image',)).line}: image: {printable(image)}"
         found += [file, beside_file(rubric, name, never_in, where, most=MOST_BYTES)]
@@ -58,7 +58,7 @@ def _tree(file: OwnFile) -> YamlTree:
         where = printable(str(file.path), 500)
         raise RubricError(f"{where}: expected UTF-8 text, found the byte 0x{file.content[error.start]:02x}") from None
     except YamlSyntaxError as error:
-        raise refused(file.path, [error.mistake]) from None
+        raise refused_file(file.path, [error.mistake]) from None
 
 
 def _map_of(file: OwnFile, image: OwnFile) -> WallMap:
@@ -81,7 +81,7 @@ def _map_of(file: OwnFile, image: OwnFile) -> WallMap:
         text = "expected a `free_thresh` that is not above `occupied_thresh`, found one that is"
         mistakes.append(tree.at(("free_thresh",)).mistake(text))
     if mistakes:
-        raise refused(file.path, mistakes)
+        raise refused_file(file.path, mistakes)
     try:
         pixels = read_image(image.content)
     except NoImage as error:

@@ -135,7 +135,7 @@ def _first(annotation: object, wanted: Callable[[object], bool]) -> Any:
     return next((hit for inner in get_args(annotation) if (hit := _first(inner, wanted))), None)
 
 
-def refused(path: Path, mistakes: Iterable[Mistake]) -> RubricError:
+def refused_file(path: Path, mistakes: Iterable[Mistake]) -> RubricError:
     """Return the error with the mistakes of a file, in their order, each once, and the first hint."""
     where, ordered = printable(str(path), 500), sorted(set(mistakes))
     lines = [f"{where}:{one.line}:{one.column}: {one.text}" for one in ordered]

@@ -67,7 +67,12 @@ def examined_packages(
         return ()
     every = sorted(names)
     sources = _Sources(programs)
-    looked_up = [found for path in programs for found in _looked_up(sources.of(path))]
+    # Only data_files are compared with what is looked up, and a file that names no share folder looks nothing up.
+    asks = any(not one.by_cmake and one.build.setup is not None for one in projects)
+    texts = {path: program.text or "" for path, program in programs.items()} if asks else {}
+    looked_up = [
+        found for path, text in texts.items() if "share" in text.casefold() for found in _looked_up(sources.of(path))
+    ]
     return tuple(
         ExaminedPackage(
             project.name,
@@ -237,11 +242,11 @@ class _Examination:
             for file in files
         }
         sources = {file for target, files in shared if f"{target}/".startswith(f"share/{name}/") for file in files}
-        for file in self._launch_files():
-            if file not in sources:
-                yield self._flaw(FlawKind.NOT_SHARED, "setup.py", file, name, find=("data_files",))
-        asked = [one for one in self.looked_up if one.package == name and one.path in self.files]
-        told = {file for file in self._launch_files() if file not in sources}
+        left = [file for file in self._launch_files() if file not in sources]
+        for file in left:
+            yield self._flaw(FlawKind.NOT_SHARED, "setup.py", file, name, find=("data_files",))
+        told = set(left)
+        asked = (one for one in self.looked_up if one.package == name and one.path in self.files)
         for one in asked:
             if f"share/{name}/{one.path}" not in places and one.path not in told:
                 told.add(one.path)
@@ -295,19 +300,25 @@ _BINDS = frozenset({"globals", "vars", "exec", "setattr", "__getattr__"})
 
 def _may_have(source: Source | None, name: str) -> bool:
     """Return whether a module may have a name: it is bound at the top level, or not all of them are known."""
-    if source is None or source.stars or any(True for _ in source.all(ast.Global)):
+    if source is None or source.stars or any(source.all(ast.Global)):
         return True
     bound = {node.id for node in source.all(ast.Name)} & _BINDS
     for node in source.nodes:
-        if next((up for up in source.around(node, ast.AST) if isinstance(up, _DEFINES)), None) is not None:
-            continue
-        if isinstance(node, _DEFINES):
-            bound.add(node.name)
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            bound.add(node.id)
-        elif isinstance(node, (ast.Import, ast.ImportFrom)):
-            bound |= {alias.asname or alias.name.partition(".")[0] for alias in node.names}
+        names = _bound_by(node)
+        if names and not any(isinstance(up, _DEFINES) for up in source.around(node, ast.AST)):
+            bound |= names
     return name in bound or not bound.isdisjoint(_BINDS)
+
+
+def _bound_by(node: ast.AST) -> set[str]:
+    """Return the names that a part of a program binds itself."""
+    if isinstance(node, _DEFINES):
+        return {node.name}
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        return {node.id}
+    if isinstance(node, (ast.Import, ast.ImportFrom)):
+        return {alias.asname or alias.name.partition(".")[0] for alias in node.names}
+    return set()
 
 
 def _imported(source: Source) -> Iterator[tuple[str, int]]:
@@ -346,7 +357,7 @@ def _with_what_they_bring(declared: Sequence[str], siblings: Mapping[str, Projec
 
 def _looked_up(source: Source | None) -> Iterator[_LookedUp]:
     """Yield the paths in share folders that a file builds from literal parts."""
-    if source is None or not any("share" in line.casefold() for line in source.lines):
+    if source is None:
         return
     paths = _Paths(source)
     for node in source.nodes:

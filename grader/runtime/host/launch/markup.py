@@ -10,14 +10,14 @@ from typing import Any
 
 from .actions import ACTIONS
 from .conditions import IfCondition, UnlessCondition
-from .context import Context, Substitution
+from .context import Context, Substitution, word_for
 from .entities import Action, LaunchDescription
 from .files import IncludeLaunchDescription
-from .left_out import LeftOutError
 from .nodes import ROS_ACTIONS, ExecuteProcess, Node
 from .parameters import ParameterFile, ParameterValue
 from .places import folders_with_places
 from .substitutions import ROS_SUBSTITUTIONS, SUBSTITUTIONS
+from .unknown import Lacking
 
 #: Limits of a file: real ones have some hundred elements, a few levels deep.
 MOST_BYTES, MOST_ELEMENTS, DEEPEST_ELEMENT = 1 << 20, 10_000, 50
@@ -38,7 +38,7 @@ class _Element:
     def text(self, name: str) -> str | None:
         """Return an attribute as a text; None without it."""
         value = self.given.get(name)
-        return None if value is None else value if isinstance(value, str) else _yaml_word(value)
+        return None if value is None else word_for(value) if isinstance(value, bool) else str(value)
 
     def needed(self, name: str) -> str:
         """Return an attribute that must be there."""
@@ -203,14 +203,14 @@ class _Reader:
     def _action(self, element: _Element) -> Any:
         make = _TAGS.get(element.tag.replace("-", "_"))
         try:
-            given = {name for name in ("if", "unless") if name in element.given}
+            given = {name for name in _CONDITIONS if name in element.given}
             if len(given) > 1:
                 raise RuntimeError("if and unless conditions can't be used simultaneously")
             condition: Any = None
             if given:
                 (name,) = given
                 condition = (IfCondition if name == "if" else UnlessCondition)(substituted(element.needed(name)))
-            made = _LeftOut(element.tag) if make is None else make(self, element)
+            made = Lacking("action", element.tag) if make is None else make(self, element)
         except (AttributeError, RuntimeError, TypeError, ValueError) as error:
             if error.__traceback__ is not None and _is_placed(error, self._path):
                 raise
@@ -226,18 +226,6 @@ def _is_placed(error: BaseException, path: str) -> bool:
             return True
         step = step.tb_next
     return False
-
-
-class _LeftOut(Action):
-    """An action that only ROS itself can do."""
-
-    def __init__(self, tag: str) -> None:
-        super().__init__()
-        self._tag = tag
-
-    def execute(self, context: Context) -> Any:
-        """Leave it out."""
-        raise LeftOutError("action", self._tag)
 
 
 _CONDITIONS = ("if", "unless")
@@ -383,12 +371,6 @@ def _set_use_sim_time(_: _Reader, element: _Element) -> Action:
     return made
 
 
-def _push_namespace(_: _Reader, element: _Element) -> Action:
-    element.refuse_others(("namespace", *_CONDITIONS), ())
-    made: Action = ROS_ACTIONS["PushRosNamespace"](substituted(element.needed("namespace")))
-    return made
-
-
 #: What makes the action of an element, by its tag with underscores.
 _TAGS: Mapping[str, Callable[[_Reader, _Element], Action]] = {
     "arg": _argument,
@@ -398,7 +380,7 @@ _TAGS: Mapping[str, Callable[[_Reader, _Element], Action]] = {
     "let": _setting(ACTIONS["SetLaunchConfiguration"], "name", "value"),
     "log": _setting(ACTIONS["LogInfo"], "message"),
     "node": _node,
-    "push_ros_namespace": _push_namespace,
+    "push_ros_namespace": _setting(ROS_ACTIONS["PushRosNamespace"], "namespace"),
     "ros_timer": _timer,
     "set_env": _setting(ACTIONS["SetEnvironmentVariable"], "name", "value"),
     "set_parameter": _set_parameter,
@@ -428,10 +410,6 @@ class _Joined(Substitution):
     def perform(self, context: Context) -> str:
         """Return their texts behind each other."""
         return "".join(part.perform(context) for part in self._parts)
-
-
-def _yaml_word(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _unescaped(text: str) -> str:
