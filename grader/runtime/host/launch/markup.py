@@ -284,7 +284,10 @@ def _value(element: _Element) -> Any:
     if separator and isinstance(value, str):
         value = value.split(separator)
     if isinstance(value, list):
-        return [_scalar(one, (kind or "").removeprefix("list_of_").removesuffix("s") or None) for one in value]
+        of_item = (kind or "").removeprefix("list_of_").removesuffix("s") or None
+        items = [_scalar(one, of_item) for one in value]
+        # Texts and substitutions in a list would be parts of one text, as in Python.
+        return [one if isinstance(one, ParameterValue) else ParameterValue(one) for one in items]
     return _scalar(value, kind)
 
 

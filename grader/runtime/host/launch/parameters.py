@@ -52,7 +52,7 @@ def evaluated_parameter(value: Any, context: Context) -> Any:  # noqa: PLR0911 -
         return text if value.type is str else value.type(_loaded(text)) if value.type in (int, float) else _loaded(text)
     if isinstance(value, Substitution):
         return _loaded(value.perform(context))
-    if isinstance(value, (list, tuple)) and any(isinstance(item, Substitution) for item in value):
+    if isinstance(value, (list, tuple)) and any(isinstance(item, (Substitution, ParameterValue)) for item in value):
         if all(isinstance(item, (str, Substitution)) for item in value):
             return _loaded(text_of(value, context))
         return [evaluated_parameter(item, context) for item in value]

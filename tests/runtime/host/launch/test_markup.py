@@ -76,6 +76,19 @@ ALIKE = {
         "- node: {pkg: robot, exec: talker, param: [{name: l, value: [1, 2, 3]}]}",
         "Node(package='robot', executable='talker', parameters=[{'l': [1, 2, 3]}])",
     ),
+    "a list with a substitution": (
+        "<arg name='a' default='x'/><node pkg='robot' exec='talker'>"
+        "<param name='l' value='$(var a);b' value-sep=';'/></node>",
+        "- arg: {name: a, default: x}\n- node: {pkg: robot, exec: talker, param: [{name: l, value: ['$(var a)', b]}]}",
+        "Node(package='robot', executable='talker', parameters=[{'l': ['x', 'b']}])",
+    ),
+    "a list of a type": (
+        "<arg name='a' default='1'/><node pkg='robot' exec='talker'>"
+        "<param name='l' value='$(var a);2' value-sep=';' type='list_of_strs'/></node>",
+        "- arg: {name: a, default: '1'}\n"
+        "- node: {pkg: robot, exec: talker, param: [{name: l, value: ['$(var a)', '2'], type: list_of_strs}]}",
+        "Node(package='robot', executable='talker', parameters=[{'l': ['1', '2']}])",
+    ),
     "a parameter file": (
         "<node pkg='robot' exec='talker'><param from='$(find-pkg-share robot)/own.yaml'/></node>",
         "- node: {pkg: robot, exec: talker, param: [{from: $(find-pkg-share robot)/own.yaml}]}",
