@@ -67,7 +67,7 @@ def examined_packages(
         return ()
     every = sorted(names)
     sources = _Sources(programs)
-    # Only data_files are compared with what is looked up, and a file that names no share folder looks nothing up.
+    # Only data_files are compared with what is looked up, and only a file that names a share folder looks something up.
     asks = any(not one.by_cmake and one.build.setup is not None for one in projects)
     texts = {path: program.text or "" for path, program in programs.items()} if asks else {}
     looked_up = [
