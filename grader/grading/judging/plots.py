@@ -475,8 +475,13 @@ def _text_panel(path: str, timed: Sequence[_Timed], prefix: str, rule: RuleOrVal
 # --- services and actions ---------------------------------------------------------------------------------------------
 
 
+def _asker(trace: Trace, service: str) -> str:
+    """Return who calls a service: the grader, or the student whom it answers."""
+    return "grader" if trace.requests(service, "grader") else "student"
+
+
 def _call_panels(trace: Trace, service: str, drawing: Drawing) -> _Panels:
-    asker = "grader" if trace.requests(service, "grader") else "student"
+    asker = _asker(trace, service)
     calls = calls_of(trace, service, asker)
     if not calls:
         return []
@@ -532,12 +537,14 @@ def delay_panel(what: str, lasted: Sequence[tuple[int, int]], within_ns: int | N
 
 def _action_panels(trace: Trace, action: str) -> tuple[_Panels, list[Stretch]]:
     """Return what was sent to an action's server and what came from it, and each goal as a case."""
-    goals = calls_of(trace, f"{action}/_action/send_goal", "grader")
+    asker = _asker(trace, f"{action}/_action/send_goal")
+    goals = calls_of(trace, f"{action}/_action/send_goal", asker)
     if not goals:
         return [], []
-    results = calls_of(trace, f"{action}/_action/get_result", "grader")
-    cancels = calls_of(trace, f"{action}/_action/cancel_goal", "grader")
-    feedback = published(trace, f"{action}/_action/feedback")
+    results = calls_of(trace, f"{action}/_action/get_result", asker)
+    cancels = calls_of(trace, f"{action}/_action/cancel_goal", asker)
+    answered = published if asker == "grader" else delivered
+    feedback = answered(trace, f"{action}/_action/feedback")
     lanes = Lanes()
     lanes.add("goal")
     lanes.dots("goal", ((g.request.t_ns, said_of(_part(g.request.value, "goal"))) for g in goals), Tone.SECOND)
@@ -554,7 +561,8 @@ def _action_panels(trace: Trace, action: str) -> tuple[_Panels, list[Stretch]]:
     lanes.add("result")
     told = [(r.t_ns, f"{status_of(r)}: {said_of(_part(r.value, 'result'))}") for r in ended]
     lanes.dots("result", told, Tone.THIRD)
-    said = f"{counted(len(goals), 'goal')} for {action}, {counted(len(feedback), 'message')} of feedback, "
+    said = f"{counted(len(goals), 'goal')} of the {asker} for {action}, "
+    said += f"{counted(len(feedback), 'message')} of feedback, "
     said += f"{counted(len(cancels), 'request')} to cancel, {counted(len(ended), 'result')}."
     numbers = _only_values(Plot(action), [(m.t_ns, _part(m.value, "feedback")) for m in feedback], "feedback")
     return [(lanes.panel(action), said), *numbers], _goal_cases(trace, goals, results)

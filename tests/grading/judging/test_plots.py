@@ -196,6 +196,51 @@ def test_a_goal_is_a_case_with_its_feedback_and_its_result() -> None:
     assert [y for _, y in chart.panels[1].series[0].points] == [1, 2]
 
 
+def asked_by_a_client() -> Recording:
+    """Return a recording of a client: a goal that is cancelled, a rejected one, and one that has not ended."""
+
+    def uuid(number: int) -> dict[str, Any]:
+        return {"goal_id": {"uuid": [number] * 16}}
+
+    rec = Recording(9)
+    for t_s, number, accepted in ((1, 1, True), (5, 2, False), (6, 3, True)):
+        rec.request(t_s, "/go/_action/send_goal", number, "student", {**uuid(number), "goal": {"order": number}})
+        rec.response(t_s + 0.1, "/go/_action/send_goal", number, {"accepted": accepted}, "grader")
+    rec.request(1.1, "/go/_action/get_result", 1, "student", uuid(1))
+    rec.deliver(2, "/go/_action/feedback", {**uuid(1), "feedback": {"done": 1}}, OTHER)
+    rec.deliver(3, "/go/_action/feedback", {**uuid(1), "feedback": {"done": 2}}, OTHER)
+    rec.request(3.5, "/go/_action/cancel_goal", 1, "student", {"goal_info": uuid(1)})
+    return rec.response(4, "/go/_action/get_result", 1, {"status": 5, "result": {"order": 0}}, "grader")
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        CHECKS["sends_goals"]("/go"),
+        CHECKS["cancels_goal"]("/go", {"done": 2}),
+        CHECKS["after_goal"]("/go", "canceled", "nothing"),
+    ],
+    ids=lambda check: type(check).__name__,
+)
+def test_the_goals_of_a_client_are_drawn_like_those_of_the_grader(check: Check) -> None:
+    """Sent by the student, answered by the grader: content, answers, feedback, the request to cancel, and results."""
+    chart = made(check, asked_by_a_client())
+    cases = [(c.start, c.stop, c.label) for c in chart.cases]
+    assert cases == [(1, 4, "goal 1: canceled"), (6, 9, "goal 3: no result")]
+    lanes = chart.panels[0]
+    assert lanes.lanes == ("goal", "feedback", "cancel", "result")
+    assert {s.name: [*zip([x for x, _ in s.points], s.texts, strict=True)] for s in lanes.series} == {
+        "goal": [(1, "order = 1"), (5, "order = 2"), (6, "order = 3")],
+        "accepted": [(1.1, "accepted"), (6.1, "accepted")],
+        "rejected": [(5.1, "rejected")],
+        "feedback": [(2, "done = 1"), (3, "done = 2")],
+        "cancel": [(3.5, "asked to cancel")],
+        "result": [(4, "canceled: order = 0")],
+    }
+    said = "3 goals of the student for /go, 2 messages of feedback, 1 request to cancel, 1 result."
+    assert chart.about.startswith(said)
+
+
 @dataclass(frozen=True, slots=True)
 class Own:
     """A check of an author, which names what it looks at."""
