@@ -9,7 +9,8 @@ from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.plan import InjectedFault, derive
+from grader.runtime.plan import InjectedFault, PlannedConnection, derive
+from grader.world.names import absolute_name
 
 #: What can be done to a topic, and to a program.
 OF_TOPICS, OF_PROGRAMS = ("delay", "lose"), ("pause", "kill")
@@ -39,6 +40,60 @@ class RunDraws:
 ALL = RunDraws()
 
 
+@dataclass(frozen=True, slots=True)
+class RunFaults:
+    """The faults that are on in a run.
+
+    Attributes:
+        names: What they are called, such as `delay /scan`.
+        connections: What happens to messages that the test publishes.
+        injected: What happens to programs, and to what they send each other.
+    """
+
+    names: tuple[str, ...]
+    connections: tuple[PlannedConnection, ...]
+    injected: tuple[InjectedFault, ...]
+
+
+def faults_of_run(  # noqa: PLR0913 - the options of the marker
+    seed: int,
+    *,
+    delay: Mapping[str, tuple[float, float]] | None = None,
+    lose: Mapping[str, float] | None = None,
+    between: Mapping[str, Mapping[str, Any]] | None = None,
+    swarm: bool = False,
+    only: RunDraws = ALL,
+) -> RunFaults:
+    """Return the faults of a run, as a test gives them.
+
+    Args:
+        seed: What is drawn in the run follows from it.
+        delay: For topics that the test publishes on, the least and the most seconds that a message is on its way.
+        lose: For such topics, the share of messages that are lost.
+        between: What is done to programs, and to what they send each other; see `injected`.
+        swarm: Whether the seed also draws which of the faults are on.
+        only: What is drawn at all, of all that the seed draws.
+
+    Raises:
+        ValueError: A fault that cannot be.
+    """
+    between_programs = tuple(injected(seed, between or {}))
+    delays = {name: _times_ns(f"delay: {name}", value) for name, value in _by_topic(delay)}
+    shares = {name: _share(f"lose: {name}", value) for name, value in _by_topic(lose)}
+    names = names_of(delays, shares, between_programs)
+    if swarm:
+        names = subset(seed, names)
+    if only.faults is not None:
+        names = tuple(name for name in names if name in only.faults)
+    late = {topic: times_ns for topic, times_ns in delays.items() if f"delay {topic}" in names}
+    lost = {topic: share for topic, share in shares.items() if f"lose {topic}" in names}
+    connections = (
+        PlannedConnection(topic, late.get(topic, (0, 0)), lost.get(topic, 0.0), derive(seed, "connection", topic))
+        for topic in dict.fromkeys((*late, *lost))
+    )
+    return RunFaults(names, tuple(connections), tuple(one for one in between_programs if one.name in names))
+
+
 def injected(seed: int, between: Mapping[str, Mapping[str, Any]]) -> Iterator[InjectedFault]:
     """Yield the faults between programs, as a test gives them.
 
@@ -60,23 +115,16 @@ def injected(seed: int, between: Mapping[str, Mapping[str, Any]]) -> Iterator[In
             if kind not in kinds:
                 what = "a topic" if on.startswith("/") else "a program; a topic begins with /"
                 raise ValueError(f"between: {on}: expected {' or '.join(kinds)} for {what}, found {kind!r}")
-            drawn = derive(seed, "fault", on if kind in OF_TOPICS else f"{kind} {on}")
+            drawn, where = derive(seed, "fault", on if kind in OF_TOPICS else f"{kind} {on}"), f"between: {on}: {kind}"
             if kind == "lose":
-                if not rising(0, value, 1):
-                    raise ValueError(f"between: {on}: lose: expected a share from 0 to 1, found {value!r}")
-                yield InjectedFault(kind, on, 0, 0, value, drawn)
-                continue
-            if not (isinstance(value, (tuple, list)) and len(value) == 2 and rising(0, *value)):
-                text = f"between: {on}: {kind}: expected the least and the most seconds, found {value!r}"
-                raise ValueError(text)
-            least_ns, most_ns = (round(one * NS_PER_S) for one in value)
-            yield InjectedFault(kind, on, least_ns, most_ns, 0.0, drawn)
+                yield InjectedFault(kind, on, 0, 0, _share(where, value), drawn)
+            else:
+                yield InjectedFault(kind, on, *_times_ns(where, value), 0.0, drawn)
 
 
 def names_of(delay: Iterable[str], lose: Iterable[str], faults: Sequence[InjectedFault]) -> tuple[str, ...]:
     """Return the names of all faults of a test: of messages of the test itself, and of those between programs."""
-    topics = [("delay", topic) for topic in delay] + [("lose", topic) for topic in lose]
-    own = [f"{kind} {topic if topic.startswith('/') else f'/{topic}'}" for kind, topic in topics]
+    own = [*(f"delay {absolute_name(topic)}" for topic in delay), *(f"lose {absolute_name(topic)}" for topic in lose)]
     return tuple(dict.fromkeys([*own, *(one.name for one in faults)]))
 
 
@@ -88,6 +136,25 @@ def subset(seed: int, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in names if Random(derive(seed, "on", name)).getrandbits(1))  # noqa: S311 - it has to repeat
 
 
-def rising(*numbers: Any) -> bool:
+def _by_topic(given: Mapping[str, Any] | None) -> Iterator[tuple[str, Any]]:
+    return ((absolute_name(topic), value) for topic, value in (given or {}).items())
+
+
+def _times_ns(where: str, value: Any) -> tuple[int, int]:
+    """Return the least and the most nanoseconds of what a test gives in seconds."""
+    if not (isinstance(value, (tuple, list)) and len(value) == 2 and _rising(0, *value)):
+        raise ValueError(f"{where}: expected the least and the most seconds, found {value!r}")
+    return round(value[0] * NS_PER_S), round(value[1] * NS_PER_S)
+
+
+def _share(where: str, value: Any) -> float:
+    """Return a share that a test gives."""
+    if not _rising(0, value, 1):
+        raise ValueError(f"{where}: expected a share from 0 to 1, found {value!r}")
+    share: float = value
+    return share
+
+
+def _rising(*numbers: Any) -> bool:
     """Return whether all of some values are numbers, and none is less than the one before it."""
     return all(isinstance(one, (int, float)) for one in numbers) and all(a <= b for a, b in pairwise(numbers))

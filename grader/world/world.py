@@ -37,7 +37,7 @@ from grader.runtime.model.trace import (
     Response,
 )
 from grader.runtime.model.wording import printable
-from grader.runtime.plan import Plan, PlannedConnection, PlannedStart, derive, ros_arguments
+from grader.runtime.plan import Plan, PlannedStart, derive, ros_arguments
 from grader.runtime.programs.executables import package_of
 from grader.runtime.serialization import (
     QoSProfile,
@@ -72,10 +72,11 @@ from grader.runtime.stimuli import PlannedGoal
 from grader.world import telling
 from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, RecordingDiffers, StepTimeout, WrongType
-from grader.world.faults import ALL, RunDraws, injected, names_of, rising, subset
+from grader.world.faults import ALL, RunDraws, faults_of_run
 from grader.world.frames import TRANSFORMS, FrameTransform, last_links, transform_between
 from grader.world.golden import KeptMessage, difference_from_kept, kept_lines, read_kept
 from grader.world.interfaces import let_import, modules_for
+from grader.world.names import absolute_name
 from grader.world.programs import (
     Found,
     Messages,
@@ -237,21 +238,9 @@ class World:
             measured=measured,
             debugger=debugger,
         )
-        delay, lose = delay or {}, lose or {}
-        faults = tuple(injected(seed, between or {}))
-        self.faults = names_of(delay, lose, faults)
-        if swarm:
-            self.faults = subset(seed, self.faults)
-        if only.faults is not None:
-            self.faults = tuple(name for name in self.faults if name in only.faults)
-        late = {topic: one for topic, one in delay.items() if f"delay {_absolute(topic)}" in self.faults}
-        lost = {topic: one for topic, one in lose.items() if f"lose {_absolute(topic)}" in self.faults}
-        self._plan = replace(
-            plan,
-            connections=tuple(_connections(seed, late, lost)),
-            faults=tuple(one for one in faults if one.name in self.faults),
-            drawn_steps=only.steps,
-        )
+        on = faults_of_run(seed, delay=delay, lose=lose, between=between, swarm=swarm, only=only)
+        self.faults = on.names
+        self._plan = replace(plan, connections=on.connections, faults=on.injected, drawn_steps=only.steps)
         self._observations: list[Observation] = []
         self._messages: dict[str, list[Message]] = {}
         self._read: dict[str, list[Received]] = {}
@@ -568,7 +557,7 @@ class World:
             WrongType: A program subscribes to the topic, and no message would ever arrive.
         """
         __tracebackhide__ = True
-        topic = _absolute(topic)
+        topic = absolute_name(topic)
         if rate is not None and rate <= 0:
             raise ValueError(f"{topic}: expected a rate above 0, found {rate:g}; None publishes once")
         several = [*message] if isinstance(message, (list, tuple)) else [message]
@@ -620,7 +609,7 @@ class World:
         path = next((found for folder in self._near if (found := folder / bag).exists()), Path(bag))
         types = topics_in(path)
         recorded = [topic for topic in types if not topic.startswith(OWN) and topic not in EVERYWHERE]
-        wanted = recorded if topics is None else [_absolute(topic) for topic in topics]
+        wanted = recorded if topics is None else [absolute_name(topic) for topic in topics]
         if lacking := [topic for topic in wanted if topic not in types]:
             close = nearest(lacking[0], recorded)
             hint = f"did you mean {close}?" if close else f"it has {first_few(sorted(recorded))}"
@@ -638,7 +627,7 @@ class World:
     def stop_publishing(self, topic: str) -> None:
         """End what the test publishes on a topic; its publisher stays."""
         __tracebackhide__ = True
-        topic = _absolute(topic)
+        topic = absolute_name(topic)
         if topic not in self._offers:
             raise ValueError(f"{topic}: expected a topic that the test publishes on, found none")
         self._perform(Publish(topic, self._offers[topic].type, ()))
@@ -656,7 +645,7 @@ class World:
             WrongType: A program has a client of another type.
         """
         __tracebackhide__ = True
-        name = _absolute(name)
+        name = absolute_name(name)
         interface = message_type_name(type, "srv")
         known = self._functions.get(name)
         if known is not None and message_type_name(known[0]) != interface:
@@ -692,7 +681,7 @@ class World:
             WrongType: A program has a client of another type.
         """
         __tracebackhide__ = True
-        name, interface = _absolute(name), message_type_name(type, "action")
+        name, interface = absolute_name(name), message_type_name(type, "action")
         known = self._actions.get(name)
         if known is not None and known.type != interface:
             raise ValueError(f"{name}: expected {known.type}, as it is served already, found {interface}")
@@ -732,7 +721,7 @@ class World:
             WrongType: The server is of another type.
         """
         __tracebackhide__ = True
-        name = _absolute(name)
+        name = absolute_name(name)
         interface, kind = type_of_part(request, "Request", name)
         self._refuse_other_server(name, interface, name)
         since_ns, seen = self._begin_ns(), len(self._observations)
@@ -800,7 +789,7 @@ class World:
 
     def _goal(self, name: str, goal: Any, cancel_after: float | None) -> GoalHandle:
         __tracebackhide__ = True
-        name = _absolute(name)
+        name = absolute_name(name)
         interface, kind = type_of_part(goal, "Goal", name)
         self._refuse_other_server(f"{name}/_action/send_goal", f"{interface}_SendGoal", name)
         self._goals += 1
@@ -865,9 +854,9 @@ class World:
         __tracebackhide__ = True
         kind = service_type("rcl_interfaces/srv/SetParameters")
         request = kind.Request(parameters=[parameter_message(name, value)])
-        result = self.call(f"{_absolute(node)}/set_parameters", request, timeout=timeout).results[0]
+        result = self.call(f"{absolute_name(node)}/set_parameters", request, timeout=timeout).results[0]
         if not result.successful:
-            raise ParameterRejected(f"{_absolute(node)}: {name} = {value!r} was not accepted: {result.reason}")
+            raise ParameterRejected(f"{absolute_name(node)}: {name} = {value!r} was not accepted: {result.reason}")
 
     @_with_hint
     def simulate(self, simulation: Simulation | str, **parameters: Any) -> Simulation:
@@ -966,7 +955,7 @@ class World:
         """
         __tracebackhide__ = True
         self._catch_up()
-        topic = _absolute(topic)
+        topic = absolute_name(topic)
         known = self._read.setdefault(topic, [])
         found = self._messages.get(topic, ())
         if type is not None:
@@ -990,7 +979,7 @@ class World:
         """
         __tracebackhide__ = True
         found = self.received(topic, type)
-        return Messages([one.message for one in found], lambda: self._silence(_absolute(topic)))
+        return Messages([one.message for one in found], lambda: self._silence(absolute_name(topic)))
 
     def transform(self, target: str, source: str) -> FrameTransform:
         """Return where a frame is in another one now, by the last transforms that programs have published.
@@ -1031,7 +1020,7 @@ class World:
         __tracebackhide__ = True
         self._catch_up()
         path = self._near[0] / file
-        names = [*map(_absolute, topics)] or sorted(set(self._messages) - set(EVERYWHERE))
+        names = [*map(absolute_name, topics)] or sorted(set(self._messages) - set(EVERYWHERE))
         now = [
             KeptMessage(one.t_ns, name, one.type, plain_fields(self._as_object(one)))
             for name in names
@@ -1047,7 +1036,7 @@ class World:
         allowed = (
             dict.fromkeys({one.topic for one in (*kept, *now)}, tolerance)
             if isinstance(tolerance, (int, float))
-            else {_absolute(name): value for name, value in tolerance.items()}
+            else {absolute_name(name): value for name, value in tolerance.items()}
         )
         late_ns = None if self._is_real else round(time_tolerance * NS_PER_S)
         if differs := difference_from_kept(kept, now, allowed, late_ns):
@@ -1079,7 +1068,7 @@ class World:
         __tracebackhide__ = True
         self._catch_up()
         since_ns = 0 if last is None else self._run.now_ns - round(last * NS_PER_S)
-        times = [one.t_ns for one in self._messages.get(_absolute(topic), ()) if one.t_ns >= since_ns]
+        times = [one.t_ns for one in self._messages.get(absolute_name(topic), ()) if one.t_ns >= since_ns]
         # n - 1 gaps, not n: counting messages overstates a short time
         return (len(times) - 1) * NS_PER_S / (times[-1] - times[0]) if times and times[-1] > times[0] else 0.0
 
@@ -1390,23 +1379,3 @@ def clock_named(name: str) -> ClockKind:
     if name not in [kind.value for kind in ClockKind]:
         raise ValueError(f"clock: expected virtual or wall, found {name!r}")
     return ClockKind(name)
-
-
-def _connections(
-    seed: int, delay: Mapping[str, tuple[float, float]], lose: Mapping[str, float]
-) -> Iterator[PlannedConnection]:
-    """Yield what happens to the messages of a test on their way; raises ValueError for what cannot be."""
-    delays = {_absolute(topic): between for topic, between in delay.items()}
-    shares = {_absolute(topic): share for topic, share in lose.items()}
-    for topic in dict.fromkeys((*delays, *shares)):
-        between, share = delays.get(topic, (0.0, 0.0)), shares.get(topic, 0.0)
-        if not (isinstance(between, (tuple, list)) and len(between) == 2 and rising(0, *between)):
-            raise ValueError(f"delay: {topic}: expected the least and the most seconds, found {between!r}")
-        if not rising(0, share, 1):
-            raise ValueError(f"lose: {topic}: expected a share from 0 to 1, found {share!r}")
-        delay_ns = round(between[0] * NS_PER_S), round(between[1] * NS_PER_S)
-        yield PlannedConnection(topic, delay_ns, share, derive(seed, "connection", topic))
-
-
-def _absolute(name: str) -> str:
-    return name if name.startswith(("/", "~")) else f"/{name}"
