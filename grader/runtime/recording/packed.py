@@ -98,8 +98,6 @@ def decoded_fields(text: msgspec.Raw) -> Mapping[str, Any]:
 
 #: Exit code, signal and Python version of a fault, as `Fault` has them.
 _FaultDetails: TypeAlias = tuple[int | None, str, tuple[int, int] | None]
-# Early recordings of version 1 do not have them.
-_NO_DETAILS: _FaultDetails = (None, "", None)
 #: The last field of a message, which is left out if it is false.
 _EARLY = ("before_discovery", bool, False)
 _SPECIAL = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -124,7 +122,7 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
     """Create the struct that validates a packed dataclass: a list of its fields, after its tag if it has one.
 
     Fields are left out that are not written, or written in another way; others are written as another type. The last
-    one is name, type and default of an optional field at the end.
+    one is name and type of a field at the end, with its default if it is left out when it has that.
     """
     hints = {**get_type_hints(kind), **others}
     fields_ = [(field.name, hints[field.name]) for field in fields(kind) if field.name not in left_out]
@@ -138,7 +136,7 @@ def _row_of(kind: type, *left_out: str, last: tuple[Any, ...] = (), **others: An
     )
 
 
-#: A start; what it was given on the command line follows in a list, which earlier recordings do not have.
+#: A start; what it was given on the command line follows in a list, if there is any.
 _START = _row_of(Start, "arguments", "launched_by", last=("given", tuple[str, str], ("", "")))
 
 
@@ -265,7 +263,7 @@ _EXACT_ROWS: Mapping[type, Any] = {
         endpoints=tuple[_row_of(Endpoint, "lease_ns", last=("lease_ns", int, 0)), ...],  # type: ignore[misc]
         last=("services", tuple[_SERVICE_END, ...], ()),  # type: ignore[valid-type]
     ),
-    Fault: _row_of(Fault, "exit_code", "signal", "python", last=("details", _FaultDetails, _NO_DETAILS)),
+    Fault: _row_of(Fault, "exit_code", "signal", "python", last=("details", _FaultDetails)),
 }
 _EXACT_MAKERS: Mapping[type, Callable[[Any], Observation]] = {
     **{_EXACT_ROWS[kind]: partial(_carrying, kind) for kind in (Message, Delivery, Request, Response)},

@@ -4,14 +4,13 @@ import contextlib
 import copy
 import json
 import math
-from dataclasses import replace
 from typing import Any, get_args
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.runtime.model.errors import HarnessError
+from grader.runtime.model.errors import EvidenceError, HarnessError
 from grader.runtime.model.trace import (
     AssessedTrace,
     ClockKind,
@@ -166,15 +165,17 @@ def test_a_trace_of_an_earlier_version_says_nothing_of_starts() -> None:
     assert trace_to_json(trace_from_json(earlier)) == earlier
 
 
-def test_a_fault_of_an_earlier_version_has_no_details() -> None:
-    """It is read all the same; nothing is taken from its text."""
+def test_a_fault_has_its_details() -> None:
+    """Without them a recording is damaged: a missing exit code would be taken for one that is not known."""
     fault = Fault(1, "a.py", FaultKind.EXITED, "exited with code 3", exit_code=3)
     trace = AssessedTrace("alone", ClockKind.VIRTUAL, 10, (fault,))
-    now = trace_to_json(trace)
-    earlier = {**now, "observations": [row[:-1] for row in now["observations"]]}
-    expected = (replace(fault, exit_code=None),)
-    assert trace_from_json(earlier).faults() == unpack_trace(json.dumps(earlier).encode()).faults() == expected
-    assert trace_from_json(now).faults() == unpack_trace(pack_trace(trace, [False])).faults() == trace.faults()
+    whole = trace_to_json(trace)
+    cut = {**whole, "observations": [row[:-1] for row in whole["observations"]]}
+    assert trace_from_json(whole).faults() == unpack_trace(pack_trace(trace, [False])).faults() == trace.faults()
+    with pytest.raises(HarnessError, match="expected grader/trace/v1, found something else"):
+        trace_from_json(cut)
+    with pytest.raises(EvidenceError, match="expected grader/trace/v1, found something else"):
+        unpack_trace(json.dumps(cut).encode())
 
 
 #: Keys and numbers that lead to a value.
