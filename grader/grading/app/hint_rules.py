@@ -30,7 +30,7 @@ def explain_rules(rubrics: tuple[Path, ...] = (), name: str = "") -> list[RuleEx
     """
     exercises = given_exercises(rubrics)
     rules = rules_in_order({rule: None for exercise in exercises for rule in rules_of(exercise)})
-    names = {kind: known for known, kind in reversed(CHECKS.items())}
+    names = {kind: known for known, kind in reversed(tuple(CHECKS.items()))}
     found = [_rule(rule, names) for rule in rules]
     if not name:
         return found

@@ -6,9 +6,8 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, field, replace
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from grader.grading.judging.diagnosis import cases_of, clues_for, diagnose, placed, rules_of
-from grader.grading.judging.diagnosis.rules import Case, Clue, Rule, is_asked
 from grader.grading.judging.figures import excerpts_for, illustrated, on_recordings
 from grader.grading.judging.findings import FAULT_KEY, SEND_LATER, fault_evidence
 from grader.grading.judging.installs import notes_on_installing
@@ -41,6 +40,9 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario, is_launch_file
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, Submission, is_notebook
 from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
+
+if TYPE_CHECKING:  # only who lost points needs diagnosis, whose modules take a twentieth of a short `grade`
+    from grader.grading.judging.diagnosis.rules import Case, Clue, Rule
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +118,9 @@ def judge_exercise(
     recorded = [(id_, t.recorded) for id_, t in assessed]
     reasons = [t.clock_reason for _, t in assessed if t.clock is ClockKind.WALL]
     mistakes: list[AuthorMistake] = []
-    if sources is not None:
+    if sources is not None and any(v.outcome in (Outcome.NOT_MET, Outcome.PARTLY) for v in verdicts):
+        from grader.grading.judging.diagnosis import cases_of, diagnose, rules_of  # noqa: PLC0415 - see above
+
         cases = cases_of(verdicts, on_recordings(exercise, verdicts), traces, submission, sources, facts)
         verdicts = diagnose(verdicts, cases, rules_of(exercise), mistakes) if any(cases) else verdicts
     notes = (f"the rubric has a mistake: {mistake}" for mistake in dict.fromkeys(mistakes))
@@ -147,6 +151,8 @@ def tried_rules(exercise: Exercise, run: Run, mistakes: list[AuthorMistake]) -> 
 
     Mistakes in the exercise's own rules are appended to `mistakes`.
     """
+    from grader.grading.judging.diagnosis import cases_of, rules_of  # noqa: PLC0415 - see above
+
     traces = {scenario: trace for (owner, scenario), trace in run.traces.items() if owner == exercise.id}
     verdicts, facts = undiagnosed(exercise, traces, run.submission, run.sources)
     cases = cases_of(verdicts, on_recordings(exercise, verdicts), traces, run.submission, run.sources, facts)
@@ -155,6 +161,9 @@ def tried_rules(exercise: Exercise, run: Run, mistakes: list[AuthorMistake]) -> 
 
 
 def _tried(exercise: Exercise, case: Case, rules: Sequence[Rule], mistakes: list[AuthorMistake]) -> TriedRules:
+    from grader.grading.judging.diagnosis import clues_for  # noqa: PLC0415 - see above
+    from grader.grading.judging.diagnosis.rules import is_asked  # noqa: PLC0415
+
     clues = tuple(clues_for(case, rules, mistakes))
     applied = [rule for rule, _ in clues]
     silent = tuple(rule for rule in rules if rule.file and is_asked(rule, case) and rule not in applied)
@@ -170,7 +179,11 @@ def _notes(
         for note in (*unusual_starts(t), *same_names(t), *notes_on_unheard(t), *unheard_by_simulations(t), *t.notes)
     )
     notes = tuple(dict.fromkeys(found))
-    return notes if sources is None else placed(notes, submission, sources)
+    if sources is None or not notes:
+        return notes
+    from grader.grading.judging.diagnosis import placed  # noqa: PLC0415 - see above
+
+    return placed(notes, submission, sources)
 
 
 def notes_on_unheard(trace: Trace) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
+from grader.runtime.compiled import compiled, state_in, state_of_package
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
 from grader.runtime.model.wording import printable
@@ -199,7 +200,7 @@ def find_packages(folder: Path) -> tuple[InterfacePackage, ...]:
 @cache
 def shipped_packages() -> tuple[InterfacePackage, ...]:
     """The packages that come with the grader: those that courses use and no wheel holds, as ROS 2 Jazzy has them."""
-    return find_packages(SHIPPED)
+    return compiled("interface_packages", state_in(SHIPPED) + state_of_package(), lambda: find_packages(SHIPPED))
 
 
 def _counts(path: Path, root: Path) -> bool:

@@ -1,78 +1,80 @@
 """The general checks that rubrics can use; CHECKS lists all of them."""
 
-from grader.grading.judging.checks.actions import ActionFeedback, ActionResult, LifecycleStates
-from grader.grading.judging.checks.clients import CallsOfClient, WaitsForService
-from grader.grading.judging.checks.closed_loop import ReachesGoal, StaysInRange
-from grader.grading.judging.checks.fields import FieldEqual, FieldFunction, FieldInRange, FieldMonotone, RandomInRange
-from grader.grading.judging.checks.goal_clients import AfterGoal, CancelsGoal, SendsGoals
-from grader.grading.judging.checks.graph import BidirectionalGraph, GraphEdges, NodeName, Qos, TopicNames
-from grader.grading.judging.checks.heard import LogsResponse, LogsTexts
-from grader.grading.judging.checks.logs import LogsEvery, LogsMatching, UsesLogger
-from grader.grading.judging.checks.packages import Installs
-from grader.grading.judging.checks.programs import (
-    CleanShutdown,
-    NoFault,
-    ParameterDeclared,
-    ParameterTakesEffect,
-    SourceAvoids,
-    SourceUses,
-)
-from grader.grading.judging.checks.rate import TopicRate
-from grader.grading.judging.checks.received import LogsReceived, LogsValues
-from grader.grading.judging.checks.services import ServiceAnswersAll, ServiceAvailable, ServiceFunction, ServiceResponse
-from grader.grading.judging.checks.timing import Latency, Period, Reaction, Silence
-from grader.grading.judging.checks.topics import FieldValues, Publishes, Subscribes, Transform
-from grader.grading.judging.checks.waiting import WaitsGracefully
+from __future__ import annotations
 
-#: Name in a rubric -> check class; the fields of the class are the parameters.
-CHECKS: dict[str, type] = {
-    "publishes": Publishes,
-    "topic_rate": TopicRate,
-    "field_values": FieldValues,
-    "uses_logger": UsesLogger,
-    "subscribes": Subscribes,
-    "waits_gracefully": WaitsGracefully,
-    "random_in_range": RandomInRange,
-    "logs_received": LogsReceived,
-    "bidirectional_graph": BidirectionalGraph,
-    "field_function": FieldFunction,
-    "logs_every": LogsEvery,
-    "logs_values": LogsValues,
-    "logs_texts": LogsTexts,
-    "logs_response": LogsResponse,
-    "service_available": ServiceAvailable,
-    "service_answers_all": ServiceAnswersAll,
-    "service_response": ServiceResponse,
-    "service_function": ServiceFunction,
-    "service_calls": CallsOfClient,
-    "waits_for_service": WaitsForService,
-    "reaction": Reaction,
-    "period": Period,
-    "latency": Latency,
-    "silence": Silence,
-    "field_equal": FieldEqual,
-    "field_in_range": FieldInRange,
-    "field_monotone": FieldMonotone,
-    "logs_matching": LogsMatching,
-    "qos": Qos,
-    "node_name": NodeName,
-    "topic_names": TopicNames,
-    "graph_edges": GraphEdges,
-    "no_fault": NoFault,
-    "clean_shutdown": CleanShutdown,
-    "parameter_declared": ParameterDeclared,
-    "parameter_takes_effect": ParameterTakesEffect,
-    "action_result": ActionResult,
-    "action_feedback": ActionFeedback,
-    "lifecycle_states": LifecycleStates,
-    "sends_goals": SendsGoals,
-    "cancels_goal": CancelsGoal,
-    "after_goal": AfterGoal,
-    "transform": Transform,
-    "reaches_goal": ReachesGoal,
-    "stays_in_range": StaysInRange,
-    "source_uses": SourceUses,
-    "source_avoids": SourceAvoids,
-    "installs": Installs,
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+
+#: Name in a rubric -> module in this folder and class; the fields of the class are the parameters.
+_PLACES = {
+    "publishes": ("topics", "Publishes"),
+    "topic_rate": ("rate", "TopicRate"),
+    "field_values": ("topics", "FieldValues"),
+    "uses_logger": ("logs", "UsesLogger"),
+    "subscribes": ("topics", "Subscribes"),
+    "waits_gracefully": ("waiting", "WaitsGracefully"),
+    "random_in_range": ("fields", "RandomInRange"),
+    "logs_received": ("received", "LogsReceived"),
+    "bidirectional_graph": ("graph", "BidirectionalGraph"),
+    "field_function": ("fields", "FieldFunction"),
+    "logs_every": ("logs", "LogsEvery"),
+    "logs_values": ("received", "LogsValues"),
+    "logs_texts": ("heard", "LogsTexts"),
+    "logs_response": ("heard", "LogsResponse"),
+    "service_available": ("services", "ServiceAvailable"),
+    "service_answers_all": ("services", "ServiceAnswersAll"),
+    "service_response": ("services", "ServiceResponse"),
+    "service_function": ("services", "ServiceFunction"),
+    "service_calls": ("clients", "CallsOfClient"),
+    "waits_for_service": ("clients", "WaitsForService"),
+    "reaction": ("timing", "Reaction"),
+    "period": ("timing", "Period"),
+    "latency": ("timing", "Latency"),
+    "silence": ("timing", "Silence"),
+    "field_equal": ("fields", "FieldEqual"),
+    "field_in_range": ("fields", "FieldInRange"),
+    "field_monotone": ("fields", "FieldMonotone"),
+    "logs_matching": ("logs", "LogsMatching"),
+    "qos": ("graph", "Qos"),
+    "node_name": ("graph", "NodeName"),
+    "topic_names": ("graph", "TopicNames"),
+    "graph_edges": ("graph", "GraphEdges"),
+    "no_fault": ("programs", "NoFault"),
+    "clean_shutdown": ("programs", "CleanShutdown"),
+    "parameter_declared": ("programs", "ParameterDeclared"),
+    "parameter_takes_effect": ("programs", "ParameterTakesEffect"),
+    "action_result": ("actions", "ActionResult"),
+    "action_feedback": ("actions", "ActionFeedback"),
+    "lifecycle_states": ("actions", "LifecycleStates"),
+    "sends_goals": ("goal_clients", "SendsGoals"),
+    "cancels_goal": ("goal_clients", "CancelsGoal"),
+    "after_goal": ("goal_clients", "AfterGoal"),
+    "transform": ("topics", "Transform"),
+    "reaches_goal": ("closed_loop", "ReachesGoal"),
+    "stays_in_range": ("closed_loop", "StaysInRange"),
+    "source_uses": ("programs", "SourceUses"),
+    "source_avoids": ("programs", "SourceAvoids"),
+    "installs": ("packages", "Installs"),
 }
+
+
+class _Checks(Mapping[str, type]):
+    """The check classes by their names in rubrics; the module of one is imported when it is first asked for."""
+
+    def __getitem__(self, name: str) -> type:
+        module, kind = _PLACES[name]
+        check: type = getattr(import_module(f"{__name__}.{module}"), kind)
+        return check
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_PLACES)
+
+    def __len__(self) -> int:
+        return len(_PLACES)
+
+    def __contains__(self, name: object) -> bool:
+        return name in _PLACES
+
+
+CHECKS: Mapping[str, type] = _Checks()
 __all__ = ["CHECKS"]
