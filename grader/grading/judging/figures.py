@@ -38,7 +38,7 @@ from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.quantities import counted, seconds
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import GraphSnapshot, Request, Response, Trace
+from grader.runtime.model.trace import GraphSnapshot, Request, Response, Trace, offered_as
 from grader.runtime.model.worlds import Sketch
 
 
@@ -340,8 +340,8 @@ def _said(graph: GraphSnapshot) -> str:
     served = {p.topic for p in publishers}
     unserved = [e for e in graph.endpoints if e.kind == "subscription" and e.topic not in served]
     parts += [f"{e.node} subscribes to {e.topic}" for e in unserved]
-    visible = [e for e in graph.services if "/_" not in e.service]
-    parts += [f"{e.node} {'serves' if e.kind == 'service' else 'calls'} {e.service}" for e in visible]
+    offered = [(e, name) for e in graph.services for kind, name in [offered_as(e.service) or ("", "")] if kind]
+    parts += [f"{e.node} {'serves' if e.kind == 'service' else 'calls'} {name}" for e, name in offered]
     return ", ".join(dict.fromkeys(parts)) or f"{counted(len(graph.nodes), 'node')} without topics"
 
 

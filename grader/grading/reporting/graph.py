@@ -8,14 +8,12 @@ from rich.cells import cell_len
 
 from grader.grading.reporting.escape import mermaid_label, shown
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.trace import Endpoint, GraphSnapshot, ServiceEnd, unmet_policy
+from grader.runtime.model.trace import Endpoint, GraphSnapshot, ServiceEnd, offered_as, unmet_policy
 
 #: Topics that every node has.
 _EVERYWHERE = frozenset({"/rosout", "/parameter_events"})
 #: Stands for a side of a topic without nodes.
 NOBODY = "(nobody)"
-#: The service of an action by which a client sends its goal.
-_GOAL_SERVICE = "/_action/send_goal"
 #: More edges than this are counted, not drawn.
 MOST_EDGES = 40
 _NAME_LIMIT = 100
@@ -52,7 +50,7 @@ class PossibleCall:
 
 def call_edges(graph: GraphSnapshot) -> list[PossibleCall]:
     """Return every client of a service or action with each server that it may call or with nobody."""
-    ends = [(kind, name, end) for end in graph.services for kind, name in _offered(end.service)]
+    ends = [(*offered, end) for end in graph.services if (offered := offered_as(end.service))]
     clients = [(kind, name, end) for kind, name, end in ends if end.kind == "client"]
     servers = [(kind, name, end) for kind, name, end in ends if end.kind == "service"]
     found = [
@@ -73,14 +71,6 @@ def _policies_of(client: ServiceEnd, server: ServiceEnd) -> str:
         if mine != other:
             return f"incompatible QoS: {mine} client, {other} server"
     return ""
-
-
-def _offered(service: str) -> Iterator[tuple[str, str]]:
-    """Yield kind and name of what a service stands for: an action has five, of which one is enough to know it."""
-    if service.endswith(_GOAL_SERVICE):
-        yield "action", service.removesuffix(_GOAL_SERVICE)
-    elif not _hidden(service):
-        yield "service", service
 
 
 _ARROWS = {"service": "{} ┄┄{}┄┄▶ {}", "action": "{} ══{}══▶ {}"}

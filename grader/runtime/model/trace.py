@@ -254,6 +254,20 @@ class ServiceEnd:
         return f"{self.durability} durability" if self.durability != "volatile" else ""
 
 
+#: The service of an action by which a client sends its goal.
+_GOAL_SERVICE = "/_action/send_goal"
+
+
+def offered_as(service: str) -> tuple[str, str] | None:
+    """Return kind and name of what a service stands for: of an action it is the one that takes goals.
+
+    The kind is `service` or `action`. None for the other services of an action, and for hidden ones.
+    """
+    if service.endswith(_GOAL_SERVICE):
+        return "action", service.removesuffix(_GOAL_SERVICE)
+    return None if "/_" in service else ("service", service)
+
+
 @dataclass(frozen=True, slots=True)
 class GraphSnapshot:
     """The live ROS graph at one moment, without the grader's own nodes; endpoints and services sorted."""

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from functools import cache
-from typing import Any
+from itertools import islice
+from typing import Any, TypeVar
 
 from jinja2 import Environment
 from markupsafe import Markup
@@ -16,6 +17,7 @@ from grader.grading.model.exercise import Audience, Location, Outcome, exercise_
 from grader.grading.model.report import ExerciseReport, JsonObject, JsonValue, Report, ReportedFault, Verdict
 from grader.grading.reporting import wording
 from grader.grading.reporting.escape import script_json, shown
+from grader.grading.reporting.graph import call_edges, graph_edges
 from grader.grading.reporting.html.assets import bundle, page_environment
 from grader.grading.reporting.html.final_mark import (
     CriterionMark,
@@ -26,11 +28,12 @@ from grader.grading.reporting.html.final_mark import (
     score_place,
 )
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.trace import ClockKind, Endpoint, GraphSnapshot
+from grader.runtime.model.trace import ClockKind, Endpoint, GraphSnapshot, ServiceEnd, offered_as
 
+_Key = TypeVar("_Key")
 _TEXT_LIMIT = 200
 _NAME_LIMIT = 60
-#: Graphs with more nodes and topics than this are not drawn.
+#: Of nodes, of topics, and of services and actions, no more than this are drawn.
 _MOST_BOXES = 60
 
 
@@ -93,14 +96,17 @@ def _living_graph(figure: Playback) -> JsonObject:
     graphs = [graph for _, graph in figure.graphs]
     nodes = tuple(dict.fromkeys(node for graph in graphs for node in graph.nodes))
     endpoints = tuple(dict.fromkeys(e for graph in graphs for e in graph.endpoints))
-    whole = _stage(Stage("", GraphSnapshot(0, nodes, endpoints)))
+    services = tuple(dict.fromkeys(end for graph in graphs for end in graph.services))
+    whole = _stage(Stage("", GraphSnapshot(0, nodes, endpoints, services)))
     stages = [_stage(Stage("", graph)) for graph in graphs]
-    names = [{box["name"] for box in (*stage["nodes"], *stage["topics"])} for stage in stages]
     edges = [{edge["text"] for edge in stage["edges"]} for stage in stages]
-    boxes = {
-        kind: [{**box, "alive": [k for k, some in enumerate(names) if box["name"] in some]} for box in whole[kind]]
-        for kind in ("nodes", "topics")
-    }
+    boxes = {}
+    for kind in ("nodes", "topics", "services"):
+        there = [{(box["kind"], box["name"]) for box in stage[kind]} for stage in stages]
+        boxes[kind] = [
+            {**box, "alive": [k for k, some in enumerate(there) if (box["kind"], box["name"]) in some]}
+            for box in whole[kind]
+        ]
     arrows = [{**e, "alive": [k for k, some in enumerate(edges) if e["text"] in some]} for e in whole["edges"]]
     return {"title": "", "times": [round(t, 3) for t, _ in figure.graphs], **boxes, "edges": arrows}
 
@@ -154,25 +160,51 @@ def _series(series: Series, columns: Columns) -> JsonObject:
 
 
 def _stage(stage: Stage) -> dict[str, Any]:
-    """Return nodes, topics and arrows; ids tell a node from a topic of the same name."""
+    """Return nodes, topics, services and arrows; ids tell a node from a topic of the same name."""
     endpoints = [e for e in stage.graph.endpoints if "/_" not in e.topic]
-    nodes = list(dict.fromkeys((*stage.graph.nodes, *(e.node for e in endpoints))))[:_MOST_BOXES]
-    topics = list(dict.fromkeys(e.topic for e in endpoints))[:_MOST_BOXES]
+    offered = [(end, offer) for end in stage.graph.services if (offer := offered_as(end.service))]
+    ends = (*(e.node for e in endpoints), *(end.node for end, _ in offered))
+    nodes = _numbered("n", (*stage.graph.nodes, *ends))
+    topics = _numbered("t", (e.topic for e in endpoints))
+    services = _numbered("s", (offer for _, offer in offered))
+    apart = {("topic", topic): why for _, topic, _, why in reversed(graph_edges(stage.graph)) if why}
+    apart |= {(call.kind, call.name): call.quarrel for call in reversed(call_edges(stage.graph)) if call.quarrel}
     drawn = [e for e in endpoints if e.node in nodes and e.topic in topics]
+    called = [(end, offer) for end, offer in offered if end.node in nodes and offer in services]
+    types: dict[tuple[str, str], list[str]] = {}
+    for key, type_ in [*((("topic", e.topic), e.type) for e in drawn), *((key, end.type) for end, key in called)]:
+        types.setdefault(key, []).append(type_.removesuffix("_SendGoal") if key[0] == "action" else type_)
     return {
         "title": shown(stage.title, limit=_NAME_LIMIT),
-        "nodes": [{"id": f"n{k}", "name": shown(name, limit=_NAME_LIMIT)} for k, name in enumerate(nodes)],
-        "topics": [
-            {"id": f"t{k}", "name": shown(name, limit=_NAME_LIMIT), **_types(name, drawn)}
-            for k, name in enumerate(topics)
+        "nodes": [{"id": id_, "kind": "node", "name": shown(name, limit=_NAME_LIMIT)} for name, id_ in nodes.items()],
+        "topics": [_box(id_, ("topic", name), types, apart) for name, id_ in topics.items()],
+        "services": [_box(id_, key, types, apart) for key, id_ in services.items()],
+        "edges": [
+            *(_edge(e, nodes[e.node], topics[e.topic]) for e in drawn),
+            *(_call_edge(end, offer, nodes[end.node], services[offer]) for end, offer in called),
         ],
-        "edges": [_edge(e, f"n{nodes.index(e.node)}", f"t{topics.index(e.topic)}") for e in drawn],
     }
 
 
-def _types(topic: str, endpoints: Iterable[Endpoint]) -> JsonObject:
-    types = list(dict.fromkeys(e.type for e in endpoints if e.topic == topic))
-    return {"types": [shown(t, limit=_NAME_LIMIT) for t in types[:5]], "quarrel": len(types) > 1}
+def _numbered(letter: str, found: Iterable[_Key]) -> dict[_Key, str]:
+    """Return an id for each of the different ones."""
+    return {one: f"{letter}{k}" for k, one in enumerate(islice(dict.fromkeys(found), _MOST_BOXES))}
+
+
+def _box(
+    id_: str, key: tuple[str, str], found: Mapping[tuple[str, str], list[str]], apart: Mapping[tuple[str, str], str]
+) -> JsonObject:
+    """Return a topic, service or action with its types, and what keeps its ends apart."""
+    kind, name = key
+    types = list(dict.fromkeys(found[key]))[:5]
+    why = apart.get(key) or (f"types differ: {', '.join(types)}" if len(types) > 1 else "")
+    return {
+        "id": id_,
+        "kind": kind,
+        "name": shown(name, limit=_NAME_LIMIT),
+        "types": [shown(t, limit=_NAME_LIMIT) for t in types],
+        "quarrel": shown(why, limit=_TEXT_LIMIT),
+    }
 
 
 def _edge(endpoint: Endpoint, node: str, topic: str) -> JsonObject:
@@ -180,6 +212,23 @@ def _edge(endpoint: Endpoint, node: str, topic: str) -> JsonObject:
     text = f"{endpoint.node} {'publishes' if endpoint.kind == 'publisher' else 'subscribes to'} {endpoint.topic}: "
     text += f"{endpoint.type}, {endpoint.reliability}, {endpoint.durability}"
     text += f", depth {endpoint.depth}" if endpoint.depth else ""
+    return {"from": ends[0], "to": ends[1], "text": shown(text, limit=_TEXT_LIMIT)}
+
+
+#: What an end of a service or an action does, by kind and end.
+_DOES = {
+    ("service", "client"): "calls",
+    ("service", "service"): "serves",
+    ("action", "client"): "sends goals to",
+    ("action", "service"): "takes goals of",
+}
+
+
+def _call_edge(end: ServiceEnd, offer: tuple[str, str], node: str, service: str) -> JsonObject:
+    kind, name = offer
+    ends = (node, service) if end.kind == "client" else (service, node)
+    text = f"{end.node} {_DOES[kind, end.kind]} {name}: {end.type.removesuffix('_SendGoal')}"
+    text += f", {end.unusual}" if end.unusual else ""
     return {"from": ends[0], "to": ends[1], "text": shown(text, limit=_TEXT_LIMIT)}
 
 

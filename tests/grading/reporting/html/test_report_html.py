@@ -7,6 +7,7 @@ import hashlib
 import json
 import re
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from parsed_page import MARKUP, Page
@@ -39,7 +40,8 @@ from grader.grading.model.chart import (
 )
 from grader.grading.model.report import Report, Reproduction
 from grader.grading.reporting.html.assets import bundle
-from grader.grading.reporting.html.render import render_html
+from grader.grading.reporting.html.render import Columns, figure_values, render_html
+from grader.runtime.model.trace import Endpoint, GraphSnapshot, ServiceEnd
 
 
 def pictured(text: str = "fine") -> Report:
@@ -56,7 +58,8 @@ def pictured(text: str = "fine") -> Report:
         (Stretch(0.0, 0.5, text),),
     )
     ends = tuple(replace(e, node=text, topic=f"/{text}", type=text) for e in both_ways().endpoints[:1])
-    graph = replace(both_ways(), nodes=(text,), endpoints=ends)
+    called = (ServiceEnd("client", f"/{text}", text, text), ServiceEnd("service", f"/{text}", text, f"/{text}"))
+    graph = replace(both_ways(), nodes=(text,), endpoints=ends, services=called)
     drawn = GraphFigure("velocity_publisher-2", text, text, ("rate",), (Stage(text, graph),))
     topic = TopicValues(f"/{text}", text, "student", 1, (0.5,), (Column(text, (text,)),))
     timeline = replace(chart, scenario=text, until_s=1.0)
@@ -102,7 +105,67 @@ def test_the_data_of_the_charts_survives_hostile_text(text: str) -> None:
     assert columns[figures["velocity_publisher-1"]["panels"][0]["series"][0]["texts"]] == [shown, shown]
     assert figures["velocity_publisher-1"]["cases"][0]["label"] == shown
     assert figures["velocity_publisher-2"]["stages"][0]["nodes"][0]["name"] == shown
+    assert figures["velocity_publisher-2"]["stages"][0]["services"][0]["name"] == f"/{shown}"
     assert figures["velocity_publisher-3"]["topics"][0]["fields"] == [{"name": shown, "values": [shown]}]
+
+
+def serving() -> GraphSnapshot:
+    """Return a graph in which one service is called and answered, one nobody serves, and an action has both ends."""
+    goal = "/go/_action/send_goal"
+    return GraphSnapshot(
+        0,
+        ("/a", "/b"),
+        (
+            Endpoint("publisher", "/t", "T", "/a", 1, "best_effort", "volatile"),
+            Endpoint("subscription", "/t", "T", "/b", 2, "reliable", "volatile"),
+        ),
+        (
+            ServiceEnd("client", "/add", "Add", "/a"),
+            ServiceEnd("service", "/add", "Add", "/b", reliability="best_effort"),
+            ServiceEnd("client", "/lost", "Find", "/a"),
+            ServiceEnd("client", goal, "Go_SendGoal", "/a"),
+            ServiceEnd("service", goal, "Go_SendGoal", "/b"),
+            ServiceEnd("service", "/go/_action/cancel_goal", "CancelGoal", "/b"),
+        ),
+    )
+
+
+def test_the_picture_of_the_graph_has_services_and_actions_with_their_ends() -> None:
+    """From the client to the server; what keeps both apart is said, and an action is one box."""
+    figure = GraphFigure("graph", "", "", (), (Stage("", serving()),))
+    values: Any = figure_values(figure, Columns())
+    (stage,) = values["stages"]
+    boxes = {box["id"]: box for box in (*stage["nodes"], *stage["topics"], *stage["services"])}
+    assert [(box["kind"], box["name"], box["types"]) for box in stage["services"]] == [
+        ("service", "/add", ["Add"]),
+        ("service", "/lost", ["Find"]),
+        ("action", "/go", ["Go"]),
+    ]
+    assert [(boxes[e["from"]]["name"], boxes[e["to"]]["name"], e["text"]) for e in stage["edges"][2:]] == [
+        ("/a", "/add", "/a calls /add: Add"),
+        ("/add", "/b", "/b serves /add: Add, best_effort reliability"),
+        ("/a", "/lost", "/a calls /lost: Find"),
+        ("/a", "/go", "/a sends goals to /go: Go"),
+        ("/go", "/b", "/b takes goals of /go: Go"),
+    ]
+    assert {box["name"]: box["quarrel"] for box in (*stage["topics"], *stage["services"]) if box["quarrel"]} == {
+        "/t": "incompatible QoS: best_effort reliability offered, reliable requested",
+        "/add": "incompatible QoS: reliable client, best_effort server",
+    }
+
+
+def test_a_service_of_a_run_is_there_from_its_moment_on() -> None:
+    """Although a topic of the same name was there before."""
+    later = ServiceEnd("service", "/t", "Find", "/b")
+    played = next(f for f in pictured().exercises[0].figures if isinstance(f, Playback))
+    graphs = ((0.0, replace(serving(), services=())), (2.0, replace(serving(), services=(later,))))
+    values: Any = figure_values(replace(played, graphs=graphs), Columns())
+    graph = values["graph"]
+    assert {(box["kind"], box["name"]): box["alive"] for box in (*graph["topics"], *graph["services"])} == {
+        ("topic", "/t"): [0, 1],
+        ("service", "/t"): [1],
+    }
+    assert graph["edges"][-1]["alive"] == [1]
 
 
 @pytest.mark.parametrize("name", SAMPLES)

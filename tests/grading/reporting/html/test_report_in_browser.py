@@ -14,9 +14,10 @@ import graded
 import pytest
 from tiers import NIGHTLY, each, more
 
-from grader.grading.model.chart import Playback
+from grader.grading.model.chart import GraphFigure, Playback, Stage
 from grader.grading.reporting.html.assets import bundle
 from grader.grading.reporting.html.render import render_html
+from grader.runtime.model.trace import GraphSnapshot, ServiceEnd
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Locator, Page
@@ -271,6 +272,45 @@ def test_the_graph_lights_up_and_grows(visit: Open) -> None:
     width = width_of(figure.locator("svg[viewBox]:not(.fold)").first)
     figure.get_by_label("Zoom in").click()
     assert width_of(figure.locator(".stage svg").first) > 1.5 * width
+    assert said == []
+
+
+def calling() -> GraphSnapshot:
+    """Return a graph in which a node calls five services of another, which sends it goals."""
+    names = [f"/service_{k}" for k in range(5)]
+    ends = [ServiceEnd(kind, name, "T", node) for name in names for kind, node in (("client", "/a"), ("service", "/b"))]
+    goal = "/go/_action/send_goal"
+    ends += [ServiceEnd("client", goal, "G_SendGoal", "/b"), ServiceEnd("service", goal, "G_SendGoal", "/a")]
+    return GraphSnapshot(0, ("/a", "/b"), (), tuple(ends))
+
+
+@pytest.mark.breadth(1, 0)
+def test_services_and_actions_are_in_the_graph_and_can_be_read_on_a_phone(visit: Open) -> None:
+    """No box and no arrow lies outside of the picture, and its text is no smaller than 11 pixels."""
+    report = graded.perfect()
+    exercise = report.exercises[0]
+    graph = GraphFigure(f"{exercise.id}-99", "Graph", "", (), (Stage("", calling()),))
+    report = replace(report, exercises=(replace(exercise, figures=(*exercise.figures, graph)),))
+    page, said, _ = visit(render_html(report), viewport={"width": 390, "height": 900})
+    unfold(page)
+    shown = page.locator(f"[data-figure={exercise.id}-99] .stage").evaluate(
+        """(stage) => {
+            const picture = stage.querySelector("svg");
+            const place = stage.querySelector(".canvas").getBoundingClientRect();
+            const parts = [...picture.querySelectorAll(".box, .arrow")].map((part) => part.getBoundingClientRect());
+            return {
+                boxes: [...picture.querySelectorAll("[data-box]")].map((box) => box.getAttribute("aria-label")),
+                arrows: picture.querySelectorAll(".arrow").length,
+                outside: parts.filter(({ left, right }) => left < place.left || right > place.right).length,
+                scale: picture.getBoundingClientRect().width / picture.viewBox.baseVal.width,
+            };
+        }"""
+    )
+    assert set(shown["boxes"]) == {
+        "node /a", "node /b", *(f"service /service_{k}, T" for k in range(5)), "action /go, G"
+    }  # fmt: skip
+    assert (shown["arrows"], shown["outside"]) == (12, 0)
+    assert shown["scale"] * 13 >= 11
     assert said == []
 
 

@@ -1,7 +1,9 @@
-// Draws the figures of kind "graph": nodes as ellipses, topics as boxes, arrows for who publishes and who subscribes.
+// Draws the figures of kind "graph": nodes as ellipses, topics as boxes, services and actions as hexagons, and arrows
+// for who publishes and who subscribes, who calls and who answers.
 const Graphs = (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const [GLYPH, HEIGHT, NARROW] = [7.9, 36, 560];
+  // A graph that is LEAST times as wide as its place is made smaller, and no more than that if it can be avoided.
+  const [GLYPH, HEIGHT, NARROW, LEAST] = [7.9, 36, 560, 1.15];
 
   function make(parent, tag, attributes, text) {
     const element = parent.appendChild(document.createElementNS(SVG, tag));
@@ -10,17 +12,41 @@ const Graphs = (() => {
     return element;
   }
 
-  function arranged(stage, upright) {
+  function boxesOf(stage) {
+    return [...stage.nodes, ...stage.topics, ...stage.services];
+  }
+
+  // The layout. On a phone boxes that would lie side by side are put below each other until their text can be read.
+  function arranged(stage, width) {
+    if (width >= NARROW) return laidOut(stage, false, 1);
+    const tried = [1, 2, 3].map((steps) => laidOut(stage, true, steps));
+    return tried.find((one) => one.width <= width * LEAST) || tried.reduce((a, b) => (b.width < a.width ? b : a));
+  }
+
+  function laidOut(stage, upright, steps) {
     const graph = new dagre.graphlib.Graph({ multigraph: true });
-    graph.setGraph({ rankdir: upright ? "TB" : "LR", nodesep: 26, ranksep: upright ? 34 : 46, marginx: 14, marginy: 14 });
+    const gaps = upright ? { rankdir: "TB", marginx: 6, nodesep: 12, edgesep: 8, ranksep: 30 } : { rankdir: "LR", marginx: 14, nodesep: 26, ranksep: 46 };
+    graph.setGraph({ marginy: 14, ...gaps });
     graph.setDefaultEdgeLabel(() => ({}));
-    for (const box of [...stage.nodes, ...stage.topics]) {
-      const wide = box.id.startsWith("n") ? 38 : 22;
+    for (const box of boxesOf(stage)) {
+      const wide = (box.kind === "topic" ? 22 : 38) - (upright ? 8 : 0);
       graph.setNode(box.id, { width: [...box.name].length * GLYPH + wide, height: HEIGHT });
     }
-    stage.edges.forEach((edge, index) => graph.setEdge(edge.from, edge.to, { text: edge.text }, String(index)));
+    const order = new Map([...stage.topics, ...stage.services].map((box, index) => [box.id, index]));
+    const far = ({ from, to }) => 1 + ((order.get(from) ?? order.get(to)) % steps);
+    stage.edges.forEach((edge, index) => {
+      graph.setEdge(edge.from, edge.to, { text: edge.text, minlen: far(edge) }, String(index));
+    });
     dagre.layout(graph);
-    return graph;
+    return { graph, ...extent(graph) };
+  }
+
+  // The layout counts boxes only, and arrows may go around them.
+  function extent(graph) {
+    const [points, { width, height }] = [graph.edges().flatMap((key) => graph.edge(key).points), graph.graph()];
+    const ends = (axis, most) => [Math.min(0, ...points.map((p) => p[axis] - 8)), Math.max(most, ...points.map((p) => p[axis] + 8))];
+    const [[left, right], [top, bottom]] = [ends("x", width), ends("y", height)];
+    return { left, top, width: right - left, height: bottom - top };
   }
 
   // Where the line from an ellipse's centre towards a point leaves it; the layout knows rectangles only.
@@ -54,19 +80,20 @@ const Graphs = (() => {
   }
 
   function drawBox(picture, place, box) {
-    const node = box.id.startsWith("n");
+    const node = box.kind === "node";
+    const types = node ? "" : box.quarrel || box.types.join(", ");
     const group = make(picture, "g", {
-      class: `${node ? "node" : "topic"}${box.quarrel ? " quarrel" : ""}`,
+      class: `${box.kind}${box.quarrel ? " quarrel" : ""}`,
       "data-box": box.id,
       tabindex: "0",
       role: "img",
-      "aria-label": node ? `node ${box.name}` : `topic ${box.name}, ${box.types.join(" and ")}`,
+      "aria-label": `${box.kind} ${box.name}${types ? `, ${types}` : ""}`,
       transform: `translate(${place.x} ${place.y})`,
     });
     const [w, h] = [place.width, place.height];
-    const said = node ? box.name : `${box.name}\n${box.quarrel ? "types differ: " : ""}${box.types.join(", ")}`;
-    make(group, "title", {}, said);
+    make(group, "title", {}, node ? box.name : `${box.kind} ${box.name}\n${types}`);
     if (node) make(group, "ellipse", { class: "box", rx: w / 2, ry: h / 2 });
+    else if (box.kind !== "topic") make(group, "path", { class: "box", d: `M${-w / 2} 0L${11 - w / 2} ${-h / 2}H${w / 2 - 11}L${w / 2} 0L${w / 2 - 11} ${h / 2}H${11 - w / 2}Z` });
     else make(group, "rect", { class: "box", x: -w / 2, y: -h / 2, width: w, height: h, rx: 4 });
     make(group, "text", {}, box.name);
     return group;
@@ -78,10 +105,9 @@ const Graphs = (() => {
     if (stage.title) section.appendChild(document.createElement("h5")).textContent = stage.title;
     const canvas = section.appendChild(document.createElement("div"));
     canvas.className = "canvas";
-    const graph = arranged(stage, width < NARROW);
-    const size = graph.graph();
+    const { graph, ...size } = arranged(stage, width);
     section.style.flex = `1 1 ${Math.min(Math.ceil(size.width) + 2, width)}px`;
-    const picture = make(canvas, "svg", { viewBox: `0 0 ${size.width} ${size.height}`, role: "group", "aria-label": stage.title || "ROS graph" });
+    const picture = make(canvas, "svg", { viewBox: `${size.left} ${size.top} ${size.width} ${size.height}`, role: "group", "aria-label": stage.title || "ROS graph" });
     const edges = graph.edges().map((key) => {
       const { text, alive } = stage.edges[Number(key.name)];
       const laid = graph.edge(key).points;
@@ -93,7 +119,7 @@ const Graphs = (() => {
       return { group, text, alive, from: key.v, to: key.w };
     });
     const groups = {};
-    for (const box of [...stage.nodes, ...stage.topics]) groups[box.id] = drawBox(picture, graph.node(box.id), box);
+    for (const box of boxesOf(stage)) groups[box.id] = drawBox(picture, graph.node(box.id), box);
     highlight(groups, edges, said);
     const resize = (scale) => {
       const fit = Math.min(1, Math.max(canvas.clientWidth - 2, 120) / size.width);
@@ -113,15 +139,16 @@ const Graphs = (() => {
     }
     // Moment: index of the last change of the graph. Busy: names of the topics on which something was just published.
     function at(moment, busy) {
-      const boxes = [...stage.nodes, ...stage.topics];
-      for (const { id, name, alive } of boxes) {
-        drawn.groups[id].classList.toggle("absent", !alive.includes(moment));
-        drawn.groups[id].classList.toggle("busy", busy.has(name) && id.startsWith("t"));
+      const isBusy = ({ kind, name }) => kind === "topic" && busy.has(name);
+      const boxes = boxesOf(stage);
+      for (const box of boxes) {
+        drawn.groups[box.id].classList.toggle("absent", !box.alive.includes(moment));
+        drawn.groups[box.id].classList.toggle("busy", isBusy(box));
       }
       for (const { group, alive, from, to } of drawn.edges) {
-        const topic = boxes.find((box) => box.id === (from.startsWith("t") ? from : to));
+        const target = boxes.find((box) => box.id === (from.startsWith("n") ? to : from));
         group.classList.toggle("absent", !alive.includes(moment));
-        group.classList.toggle("busy", busy.has(topic.name) && alive.includes(moment));
+        group.classList.toggle("busy", isBusy(target) && alive.includes(moment));
       }
     }
     paint();
