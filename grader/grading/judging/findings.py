@@ -190,9 +190,8 @@ def fault_place(fault: Fault) -> str:
 
 def _own_words(fault: Fault) -> str:
     """Return what happened; the message of an exception is quoted if it could be mistaken for the grader's words."""
-    if fault.kind is FaultKind.EXITED:
-        code = "?" if fault.exit_code is None else fault.exit_code
-        return f"exited after {span(fault.t_ns)} with code {code}"
+    if fault.exit_code is not None:  # a launch file that ended has none, and its text says how
+        return f"exited after {span(fault.t_ns)} with code {fault.exit_code}"
     text = quote(fault.text)
     kind, colon, message = text.partition(": ")
     if fault.kind is not FaultKind.EXCEPTION or ";" not in text:

@@ -36,3 +36,11 @@ def test_only_what_is_not_ordinary_is_noted(way: StartWay, target: str, notes: t
 def test_a_message_that_reads_like_parts_of_a_reason_is_quoted(text: str, told: str) -> None:
     """A semicolon separates the grader's own words: the text of an exception cannot follow it."""
     assert fault_sentence(Fault(0, "a.py", FaultKind.EXCEPTION, text, "a.py", 3)) == told
+
+
+def test_a_launch_file_that_ended_has_no_exit_code() -> None:
+    """Its fault says what became of it instead; a program's says its code."""
+    launch = Fault(0, "robot.launch.py", FaultKind.EXITED, "describes no node")
+    program = Fault(2_000_000_000, "a.py", FaultKind.EXITED, "exited", exit_code=0)
+    assert fault_sentence(launch) == "robot.launch.py describes no node"
+    assert fault_sentence(program) == "a.py exited after 2.0 s with code 0"
