@@ -1,9 +1,19 @@
 """Typical mistakes of this exercise: which line has them, and what to do about it."""
 
 import ast
+import math
 
 from grader.api import Case, Clue, hint_rule
-from grader.api.unstable import last_name
+from grader.api.unstable import constant_value, given_leaf, last_name, names_in
+
+#: More than a full turn is no angle in radians.
+FULL_TURN = 2 * math.pi
+#: What is too near the wall for certain, and what is too far away.
+NEAR, FAR = 0.4, 0.6
+#: A turn rate that is no accident, in rad/s.
+TURNS = 0.1
+#: So many commands in moments that leave no doubt, and so large a share of them, tell that the sign is wrong.
+FEWEST, SHARE = 5, 0.8
 
 
 def names(case: Case) -> set[str | None]:
@@ -32,8 +42,61 @@ def first_ray_looks_back(case: Case) -> Clue | None:
     used = [node for node in case.source.all(ast.Attribute) if node.attr == "angle_increment"]
     if case.check.topic != "/truth/clearance" or "angle_min" in names(case) or not used:
         return None
-    hint = "the first ray looks back here: the angle of ray k is angle_min + k * angle_increment"
+    hint = "the first ray looks back, to angle_min: the angle of ray k is angle_min + k * angle_increment"
     return Clue(hint, case.source.place(used[0]))
+
+
+@hint_rule("stays_in_range")
+def angle_in_degrees(case: Case) -> Clue | None:
+    """An angle of the scanner, which is in radians, meets a number in degrees."""
+    if case.check.topic not in ("/truth/clearance", "/truth/odometry"):
+        return None
+    pairs = [
+        (node.left, node.right, node) for node in case.source.all(ast.BinOp) if isinstance(node.op, ast.Add | ast.Sub)
+    ]
+    pairs += [(node.left, side, node) for node in case.source.all(ast.Compare) for side in node.comparators]
+    for left, right, node in pairs:
+        for angle, other in ((left, right), (right, left)):
+            named = last_name(angle)
+            found = constant_value(case.source, other)
+            if "angle" not in named.lower() or "deg" in named.lower() or found is None:
+                continue
+            if abs(found.value) > FULL_TURN:
+                hint = f"{named} is in radians, and {case.source.code(other, 30)} in degrees"
+                return Clue(f"{hint}: write math.radians({found.value:g})", case.source.place(node))
+    return None
+
+
+@hint_rule("stays_in_range")
+def turns_the_wrong_way(case: Case) -> Clue | None:
+    """The robot turns away from a wall that is too far, or towards one that is too near."""
+    given = [n for n in given_leaf(case.source, "z") if "angular" in case.source.code(n)]
+    if case.check.topic != "/truth/clearance" or not given:
+        return None
+    wanted = {scan.t_ns: sign for scan in case.trace.deliveries("/scan") if (sign := turn_wanted(scan.value))}
+    turned = [(m.t_ns, float(m.value["angular"]["z"])) for m in case.trace.messages("/cmd_vel")]
+    clear = [turn * wanted[t_ns] for t_ns, turn in turned if t_ns in wanted and abs(turn) > TURNS]
+    wrong = [turn for turn in clear if turn < 0]
+    if len(clear) < FEWEST or len(wrong) < SHARE * len(clear):
+        return None
+    hint = f"{len(wrong)} of {len(clear)} times this turned away from a wall that was too far, or towards one too near"
+    return Clue(f"{hint}: positive turns to the left, so turn the sign round", case.source.place(given[0]))
+
+
+def turn_wanted(scan: dict) -> int:
+    """Return 1 where the robot has to turn left, -1 where it has to turn right, 0 where that is not certain.
+
+    The wall on the left is too far, and the robot does not head for it; or it is too near, and the robot does.
+    """
+    near = [
+        (distance, scan["angle_min"] + number * scan["angle_increment"])
+        for number, distance in enumerate(scan["ranges"])
+        if isinstance(distance, float) and scan["range_min"] <= distance <= scan["range_max"]
+    ]
+    distance, angle = min(near, default=(0.5, 0.0))
+    if distance > FAR and math.pi / 2 <= angle <= math.pi:
+        return 1
+    return -1 if distance < NEAR and 0 <= angle <= math.pi / 2 else 0
 
 
 @hint_rule("stays_in_range")

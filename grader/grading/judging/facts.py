@@ -71,3 +71,11 @@ class OtherEnd:
 
     name: str  # its topic or service
     type: str  # its type
+
+
+@dataclass(frozen=True, slots=True)
+class GoalFieldFacts:
+    """The first field of a goal that is not as expected, where one value is expected."""
+
+    path: str
+    wanted: str | float

@@ -9,6 +9,7 @@ from dataclasses import field
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
+from grader.grading.judging.facts import GoalFieldFacts
 from grader.grading.judging.findings import explain_fault, faulted, first_fault, met, not_met, observed
 from grader.grading.judging.service_calls import LATENESS_NS, Call, calls_of, status_of
 from grader.grading.judging.values import JITTER_NS, RuleOrValue, breach, broken_rules, delivered, rules_text, value_at
@@ -132,7 +133,8 @@ class SendsGoals:
             if wrong:
                 flaw = breach(goal.content, wrong[0], rules[wrong[0]])
                 reason = f"{moment(goal.t_ns)}, {self.action}, goal {place + 1}: {flaw}"
-                return not_met(reason, evidence, problem=ProblemKind.WRONG_VALUE)
+                facts = _field_facts(wrong[0], rules[wrong[0]])
+                return not_met(reason, evidence, problem=ProblemKind.WRONG_VALUE, facts=facts)
         for before, after in pairwise(goals) if self.one_at_a_time else ():
             if after.t_ns < before.end_ns:
                 reason = f"{moment(after.t_ns)}, {self.action}: a goal is sent while the one before runs"
@@ -146,6 +148,14 @@ class SendsGoals:
         most = "" if self.at_most is None else f" and at most {self.at_most}"
         reason = f"{self.action}: {counted(len(goals), 'goal')}, expected at least {self._least}{most}"
         return not_met(reason, evidence, problem=problem)
+
+
+def _field_facts(path: str, rule: RuleOrValue) -> GoalFieldFacts | None:
+    """Return what a hint rule may read of a field that is not as expected; None if several values would be right."""
+    if isinstance(rule, str):
+        return GoalFieldFacts(path, rule)
+    plain = isinstance(rule, (int, float)) and not isinstance(rule, bool)
+    return GoalFieldFacts(path, float(rule)) if plain else None  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from grader.grading.judging.diagnosis import (
+    actions,
     attributes,
     callbacks,
     crashes,
@@ -43,6 +44,7 @@ _MODULES = (
     loading,
     scopes,
     services,
+    actions,
     callbacks,
     crashes,
     attributes,

@@ -1,12 +1,36 @@
-"""The hint rule for what a simulation does not hear: it is asked before all others, because they take it as heard."""
+"""The hint rules for what does not pass between a node and the grader: they are asked before all others.
+
+Other rules take it as heard. Those about a robot that hears its node, and does not move as the node meant, come last.
+"""
 
 from __future__ import annotations
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, file_for, hint_rule
-from grader.grading.judging.diagnosis.wiring import made_for
-from grader.grading.judging.simulations import NotHeard, not_heard
-from grader.grading.judging.values import student_endpoints
+import ast
+from collections.abc import Iterator
+from itertools import pairwise
+
+from grader.grading.judging.diagnosis.rules import Case, Clue, file_for, hint_rule, silent_topic, unheard_topic
+from grader.grading.judging.diagnosis.wiring import (
+    Made,
+    given_leaf,
+    goes_to,
+    made,
+    made_for,
+    number_in_code,
+    pauses,
+    publish_calls,
+    runs,
+    short,
+    text_origin,
+)
+from grader.grading.judging.simulations import NotHeard, heard_by_simulations, not_heard
+from grader.grading.judging.source import Source, argument, chain, first_line
+from grader.grading.judging.values import student_endpoints, value_at
 from grader.grading.model.exercise import roles_of, texts_under
+from grader.grading.model.wording import nearest, number, quote
+from grader.runtime.model.dataclass import dataclass
+from grader.runtime.model.quantities import seconds
+from grader.runtime.model.trace import Delivery
 
 
 @hint_rule(priority=10)
@@ -32,3 +56,119 @@ def _may_explain(found: NotHeard, case: Case) -> bool:
         return True
     heard = {end.topic for end in student_endpoints(case.trace, "subscription")}
     return any(case.trace.deliveries(topic) and topic in heard for topic in topics)
+
+
+@hint_rule(priority=20)
+def _hears_nobody(case: Case) -> Clue | None:
+    """A node subscribes to a topic on which nobody publishes, and not to one of the grader's with the same type."""
+    if case.logs or unheard_topic(case):
+        return None
+    for deaf in _deaf(case):
+        inside = set(runs(deaf.source, deaf.item))
+        calls = publish_calls(deaf.source)
+        silent = silent_topic(case) and calls and all(call in inside for call in calls)
+        if silent or (not silent_topic(case) and _is_told(case)):
+            origin = text_origin(deaf.source, argument(deaf.item.call, 1, "topic"), deaf.item.call)
+            hint = f"{deaf.source.code(deaf.item.call)} hears nobody"
+            hint = f"{hint}: {short(deaf.item.type)} is published on {deaf.topic}, subscribe to that"
+            return Clue(hint, deaf.source.place(origin), key=f"topic:{deaf.source.file}:{deaf.item.call.lineno}")
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _DeafItem:
+    """A subscription that hears nobody, and the topic of the grader's that was probably meant."""
+
+    source: Source
+    item: Made
+    topic: str
+
+
+def _deaf(case: Case) -> Iterator[_DeafItem]:
+    trace = case.trace
+    offered = {d.topic: d.type for d in trace.of(Delivery)}
+    ends = student_endpoints(trace, "subscription")
+    published = {*offered, *(e.topic for e in student_endpoints(trace, "publisher") if trace.messages(e.topic))}
+    unheard = {topic: type_ for topic, type_ in offered.items() if all(e.topic != topic for e in ends)}
+    for end in ends:
+        if end.topic in published:
+            continue
+        meant = [topic for topic, type_ in unheard.items() if type_ == end.type and not topic.startswith(_TRUTH)]
+        topic = meant[0] if len(meant) == 1 else nearest(end.topic, meant)
+        source = file_for(case, "subscription", end.topic)
+        item = made_for(source, "subscription", end.topic, short(end.type))
+        if topic and item is not None and goes_to(item.topic, end.topic):
+            yield _DeafItem(source, item, topic)
+
+
+#: Where a simulation that comes with the grader tells checks what no node should know.
+_TRUTH = "/truth/"
+
+
+def _is_told(case: Case) -> bool:
+    """Return whether a check is about a topic of the grader's that no node hears: what a simulation makes of it all."""
+    heard = {end.topic for end in student_endpoints(case.trace, "subscription")}
+    return any(case.trace.deliveries(topic) and topic not in heard for topic in _asked_topics(case))
+
+
+def _asked_topics(case: Case) -> set[str]:
+    return {*case.topics, *texts_under(case.check, *roles_of(type(case.check)).topics)}
+
+
+#: The field by which a robot on wheels drives or turns, and those beside it.
+_BESIDE = {"angular.z": ("angular.x", "angular.y"), "linear.x": ("linear.y", "linear.z")}
+_TWISTS = {"geometry_msgs/msg/Twist": "", "geometry_msgs/msg/TwistStamped": "twist."}
+
+
+@hint_rule(priority=8300)
+def _beside_the_wheels(case: Case) -> Clue | None:
+    """The commands turn around another axis, or go to another side, and never set the field that a robot obeys."""
+    if not _is_told(case):
+        return None
+    for topic in heard_by_simulations(case.trace):
+        messages = [m for m in case.trace.messages(topic) if m.type in _TWISTS]
+        for right, others in _BESIDE.items():
+            used = {f for f in (right, *others) if any(_of(m.value, _TWISTS[m.type] + f) for m in messages)}
+            if right in used or len(used) != 1:
+                continue
+            (wrong,) = used
+            source = file_for(case, "publisher", topic)
+            given = [n for n in given_leaf(source, wrong[-1]) if _is_field(n, wrong)]
+            if given:
+                does = "turns" if right == "angular.z" else "drives"
+                hint = f"{source.code(given[0], 50)}: a robot on wheels {does} by {right}, which is always 0"
+                return Clue(f"{hint}: set {right}", source.place(given[0]), key=f"beside:{right}")
+    return None
+
+
+def _of(value: object, path: str) -> float:
+    found = value_at(value, path) if isinstance(value, dict) else None
+    return float(found) if isinstance(found, (int, float)) else 0.0
+
+
+def _is_field(node: ast.AST, path: str) -> bool:
+    return isinstance(node, ast.Assign) and any(chain(target).endswith(f".{path}") for target in node.targets)
+
+
+@hint_rule(priority=8310)
+def _robot_waits(case: Case) -> Clue | None:
+    """A callback sleeps for longer than it takes until the next message, while the robot goes on."""
+    if not _is_told(case):
+        return None
+    for source in case.sources.values():
+        for pause in pauses(source):
+            periods = [_period_s(case, m) for m in made(source, "subscription") if pause.call in runs(source, m)]
+            periods += [number_in_code(source, m.period) or 0.0 for m in made(source, "timer")]
+            if pause.seconds is not None and any(0 < period < pause.seconds for period in periods):
+                code = source.code(pause.call, 50)
+                hint = f"{code} holds up every callback for {number(pause.seconds)} s, and the robot goes on as it "
+                hint += "was told last: remove it"
+                return Clue(hint, source.place(pause.call), key=f"sleeps:{first_line(pause.call)}")
+    return None
+
+
+def _period_s(case: Case, item: Made) -> float:
+    """Return the usual time between the grader's messages on the topic of a subscription; 0 if there are too few."""
+    times = [d.t_ns for d in case.trace.deliveries(f"/{quote(item.topic or '').strip('/')}")]
+    gaps = sorted(b - a for a, b in pairwise(times))
+    return seconds(gaps[len(gaps) // 2]) if gaps else 0.0

@@ -25,7 +25,9 @@ from diagnosis_samples import (
     spoilt,
     submission_to,
 )
+from places import ROOT
 from sample_folders import folders_in
+from tables import read_table
 from tiers import each, more
 
 from grader.grading.judging.diagnosis import CAUSE_KEY, RULES, cases_of, diagnose, rules_of
@@ -43,6 +45,7 @@ Row = Mapping[str, Any]
 CRASHES = rows("crashes.yaml")
 BEHAVIOURS = rows("behaviours.yaml")
 SLIPS = rows("slips.yaml")
+EXAMPLE_SLIPS = [read_table(path) for path in sorted((ROOT / "examples").glob("*/slips.yaml"))]
 ENDED = [row for row in SLIPS if "fault" in row]
 
 
@@ -175,6 +178,7 @@ def test_every_rule_is_shown_to_work() -> None:
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
     shown |= {cause for _, _, _, cause in LAUNCH_SLIPS}
     shown |= {"unheard_by_simulation"}  # test_simulated.py
+    shown |= {row["cause"] for table in EXAMPLE_SLIPS for row in table}  # tests/test_example_slips.py
     # it only names another criterion, so that reports do not name it
     shown |= {"follows" for v in verdicts if v.get("same_cause_as") and CAUSE_KEY not in v["evidence"]}
     assert {rule.id for rule in EVERY} - shown == set()
@@ -186,7 +190,8 @@ def test_the_rules_are_asked_in_the_order_that_is_written_down() -> None:
     assert [rule.id for rule in rules_in_order(EVERY)] == [*order, "follows"]
     priorities = [rule.priority for rule in EVERY]
     assert len(set(priorities)) == len(priorities)
-    assert sorted(priorities)[1] >= 1000 > FIRST > min(priorities)  # what no simulation hears is told before all
+    # what does not pass between a node and the grader is told before all
+    assert sorted(priorities)[2] >= 1000 > FIRST > sorted(priorities)[1]
 
 
 def test_the_ids_of_rules_are_unique() -> None:
@@ -383,6 +388,7 @@ def test_a_near_miss_is_not_blamed(
 
 #: Rules that say what a program does wrong, whatever was recorded: a right program must never get them.
 TEXTUAL = {rule.id for rule in EVERY} - {
+    "hears_nobody",  # which topics were heard
     "guarded",  # which messages were heard, and that nothing followed
     "logs_held_up",  # that logs are late or missing
     "log_line",  # where a log is written
