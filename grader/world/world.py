@@ -1259,6 +1259,9 @@ class World:
         if isinstance(command, StartProcesses):
             for name in told["started"]:
                 self._programs.setdefault(name, Program(name, Path(command.plan.root), self._signal, self._catch_up))
+        for name, root in told.get("begun", {}).items():  # a launch file has started them, and maybe again
+            if name not in self._programs:
+                self._programs[name] = Program(name, Path(root), self._signal, self._catch_up)
         self._adopt(observations)
         if self._run.full:
             raise GraderError(f"the test was ended: {self._run.full}")

@@ -9,9 +9,9 @@ from places import ROOT
 from tiers import each
 
 #: A block that begins with its file's name.
-_FILE = re.compile(r"^```python\n# (\w+\.py)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_FILE = re.compile(r"^```python\n# ([\w.]+\.py)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 #: How many tests a page has, and how many files; and the tests that make what others of the page need.
-PAGES = {"docs/tutorials/first-test.md": (1 + 2 + 5 + 3, 5), "docs/how-to/launch-testing.md": (13, 14)}
+PAGES = {"docs/tutorials/first-test.md": (1 + 2 + 5 + 3, 5), "docs/how-to/launch-testing.md": (14, 16)}
 #: What the tests of a page need and it does not show: nodes, parameters, and a test that makes a recording.
 BESIDE = Path(__file__).parent / "beside_pages"
 

@@ -419,7 +419,7 @@ from launch_ros.actions import Node
 
 def generate_launch_description():
     camera = Node(package="usb_cam", executable="usb_cam_node")
-    after = RegisterEventHandler(OnProcessExit(target_action=camera, on_exit=[]))
+    after = RegisterEventHandler(OnProcessExit(target_action=camera, on_exit=print))
     return LaunchDescription([Node(package="demo", executable="echo.py"), camera, after])
 """,
     )
@@ -431,4 +431,4 @@ def generate_launch_description():
     result.assert_outcomes(passed=1, failed=1, warnings=2)
     failure, _, warning = result.stdout.str().partition("warnings summary")
     for text in (failure, warning):
-        assert "the action RegisterEventHandler is not supported" in text
+        assert "the event handler OnProcessExit was left out: only lists of actions" in text

@@ -227,8 +227,7 @@ def evaluate(request: dict[str, Any]) -> None:
         arguments = dict(told["arguments"])
         describer.hide(installed)
         folders = (root, own)
-        nodes, left_out = describe(folders, path, packages, arguments, prefix=installed, **told["most"])
-        found = LaunchReport(nodes, left_out)
+        found = describe(folders, path, packages, arguments, prefix=installed, **told["most"])
     except BaseException as error:  # whatever the launch file raises becomes a fault
         found = LaunchReport(fault=describer.exception(error))
     flush()

@@ -239,6 +239,49 @@ class WrittenContent(NamedTuple):
     content: str  # in base64
 
 
+#: The most handlers of events that a launch file registers, and the most that is done at once.
+MOST_HANDLERS = 100
+
+
+class LaunchStep(NamedTuple):
+    """What a launch file does when it begins, or when one of its event handlers is called."""
+
+    act: str = ""  # `start` a node, `register` an event handler, or `shutdown`
+    number: int = 0  # of the node or of the handler
+    delay_s: float = 0.0  # after the launch file began, or after the event
+
+    @classmethod
+    def checked(cls, data: Any) -> "LaunchStep | None":
+        """Return what a process reports; None if a launch file cannot do it."""
+        if not isinstance(data, dict) or data.get("act") not in ("start", "register", "shutdown"):
+            return None
+        return cls(data["act"], _number(data.get("number")) or 0, _delay_s(data.get("delay_s")))
+
+
+class LaunchHandler(NamedTuple):
+    """An event handler of a launch file, with what it does."""
+
+    event: str = ""  # of a node: `start`, each `exit`, `complete` once it is not started again; or `shutdown`
+    node: int = -1  # the number of the node; -1 for any
+    once: bool = False  # whether it is called for the first event only
+    steps: Sequence[LaunchStep] = ()
+
+    @classmethod
+    def checked(cls, data: Any) -> "LaunchHandler":
+        """Return what a process reports; a handler of no event is never called."""
+        if not isinstance(data, dict):
+            return cls()
+        node = _number(data.get("node", -1))
+        # a handler of a node that cannot be is one of no event, not of any node
+        event = _text(data.get("event")) if node is not None else ""
+        return cls(event, -1 if node is None else node, data.get("once") is True, _steps(data.get("steps")))
+
+
+def _steps(data: Any) -> list[LaunchStep]:
+    found = (LaunchStep.checked(one) for one in _list(data)[:MOST_HANDLERS])
+    return [one for one in found if one is not None]
+
+
 class LaunchedNode(NamedTuple):
     """A node that a launch file describes."""
 
@@ -248,16 +291,18 @@ class LaunchedNode(NamedTuple):
     arguments: Sequence[str] = ()
     ros_arguments: Sequence[str] = ()  # what follows `--ros-args`
     parameter_files: Sequence[Sequence[str]] = ()  # name and text of each
-    delay_s: float = 0.0  # after the start of the launch file
     file: str = ""  # where it is described: a path in the submission, or the name of a file of the rubric
     line: int = 0
     parameters: Sequence[str] = ()  # the names of those that the launch file gives this node by name
     remappings: Sequence[Sequence[str]] = ()  # old and new name of each that it gives this node
+    respawn: bool = False  # whether it is started again when it has ended
+    respawn_delay_s: float = 0.0  # how long after its end
+    respawn_most: int = -1  # how often at most; -1 without a limit
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> "LaunchedNode":
         """Return what a process reports."""
-        delay_s = data.get("delay_s")
+        most = _number(data.get("respawn_most", -1))
         files = [one for one in _list(data.get("parameter_files")) if isinstance(one, list) and len(one) == 2]
         return cls(
             _text(data.get("package")),
@@ -266,11 +311,13 @@ class LaunchedNode(NamedTuple):
             list(map(_text, _list(data.get("arguments")))),
             list(map(_text, _list(data.get("ros_arguments")))),
             [(_text(name), _text(text)) for name, text in files],
-            delay_s if isinstance(delay_s, (int, float)) else 0.0,
             _text(data.get("file")),
             _number(data.get("line")) or 0,
             list(map(_text, _list(data.get("parameters")))),
             [list(map(_text, one)) for one in _list(data.get("remappings")) if isinstance(one, list) and len(one) == 2],
+            data.get("respawn") is True,
+            _delay_s(data.get("respawn_delay_s")),
+            -1 if most is None else most,
         )
 
 
@@ -475,6 +522,8 @@ class LaunchReport(NamedTuple):
     nodes: Sequence[LaunchedNode] = ()
     left_out: Sequence[NotEvaluated] = ()
     fault: FaultReport | None = None  # what ended the evaluation; there are no nodes then
+    steps: Sequence[LaunchStep] = ()  # what it does when it begins
+    handlers: Sequence[LaunchHandler] = ()
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> "LaunchReport":
@@ -483,6 +532,8 @@ class LaunchReport(NamedTuple):
             [LaunchedNode.checked(one) for one in _list(data.get("nodes")) if isinstance(one, dict)],
             [NotEvaluated.checked(one) for one in _list(data.get("left_out")) if isinstance(one, dict)],
             FaultReport.checked(data["fault"]) if "fault" in data else None,
+            _steps(data.get("steps")),
+            [LaunchHandler.checked(one) for one in _list(data.get("handlers"))[:MOST_HANDLERS]],
         )
 
 
@@ -645,6 +696,11 @@ def _number(value: Any) -> int | None:
 
 def _whole(value: Any) -> int | None:
     return value if isinstance(value, int) else None
+
+
+def _delay_s(value: Any) -> float:
+    """Return a delay; longer than any run is never, and NaN fails both comparisons."""
+    return float(value) if isinstance(value, (int, float)) and 0 < value < 1e6 else 0.0
 
 
 def _list(value: Any) -> list[Any]:

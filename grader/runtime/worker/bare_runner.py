@@ -69,6 +69,8 @@ class BareRunner(WallRunner):
             self._real_time.sleep(PAUSE_S)
             self._observer.await_arrival(FIRST_LOOK_NS)
         self._started = self._real_time.monotonic_ns()
+        for student in self._students:
+            self._note_start(student)
 
     def _look(self, now_ns: int) -> None:
         super()._look(now_ns)

@@ -21,6 +21,7 @@ from grader.runtime.stimuli.calls import Ask
 from grader.runtime.stimuli.events import TopicEvent
 from grader.runtime.stimuli.simulation import Step
 from grader.runtime.worker.claims import ORDINARY_END, claims_of, compatible, ends_of_kind, passes, readers_of
+from grader.runtime.worker.launch_service import LaunchDue
 
 #: The most steps at once, and how many more may come with each second of virtual time; more end the scenario. Nodes
 #: that rest need far fewer: ten with timers of 100 Hz that hear each other take some thousand a second.
@@ -203,7 +204,7 @@ class Agenda:
 
     def is_over(self, processes: Iterable[Process]) -> bool:
         """Return whether nothing more can happen: nobody is left, and what is published is published to nobody."""
-        going_on = (TopicEvent, Step, LeaseEnds)
+        going_on = (TopicEvent, Step, LeaseEnds, LaunchDue)
         return all(p.ended for p in processes) and not any(isinstance(d, going_on) for d in self.due)
 
 

@@ -41,6 +41,7 @@ from grader.runtime.programs.executables import (
 )
 from grader.runtime.usage import families, usage
 from grader.runtime.worker.ending import START_CPU_S, graders_fault, reported_fault
+from grader.runtime.worker.launch_service import LaunchService
 from grader.runtime.worker.notes import Places, left_out_sentence, quoted
 from grader.runtime.worker.student_process import NodeProcess
 
@@ -101,7 +102,9 @@ class EvaluatedLaunch:
     """What a launch file describes.
 
     Attributes:
-        processes: Name and file of each process.
+        processes: Name and file of each process that it starts by itself, at once or after a time.
+        later: Name and file of each that it starts when something has happened.
+        service: What it does while they run; None for one that does nothing more.
         starts: What each is started with.
         labels: The name of each process in the trace.
         starts_ns: Name and start time of those that start late.
@@ -114,6 +117,8 @@ class EvaluatedLaunch:
     """
 
     processes: tuple[tuple[str, str], ...] = ()
+    later: tuple[tuple[str, str], ...] = ()
+    service: LaunchService | None = None
     starts: tuple[PlannedStart, ...] = ()
     labels: tuple[tuple[str, str], ...] = ()
     starts_ns: tuple[tuple[str, int], ...] = ()
@@ -130,7 +135,7 @@ def evaluated(student: NodeProcess, plan: Plan) -> EvaluatedLaunch:
     made = _evaluated(student, plan)
     student.drain()
     written = tuple(student.output(0, final=True))
-    if made.processes:
+    if made.labels:
         # A node may go by the name of the launch file: what the launch file prints is nothing that the node logs.
         written = tuple(replace(one, process=f"{one.process} (evaluation)") for one in written)
     return replace(made, written=written)
@@ -181,7 +186,8 @@ def _launched(name: str, report: LaunchReport, plan: Plan, places: Places) -> Ev
     left_out, unstarted, notes = _not_done(name, report, places)
     ignored = ignored_packages(root) if plan.projects else {}
     made = EvaluatedLaunch()
-    for node in report.nodes[:MOST_LAUNCHED]:
+    named: dict[int, str] = {}
+    for number, node in enumerate(report.nodes[:MOST_LAUNCHED]):
         package, wanted = _text(node.package), _text(node.executable)
         # Reported by a process that the student's code shares: only a package that is there is named.
         near = _text(node.near) if has_package(plan.projects, _text(node.near)) else ""
@@ -215,13 +221,44 @@ def _launched(name: str, report: LaunchReport, plan: Plan, places: Places) -> Ev
         if not known_package:
             notes.append(f"{where}: {_lacking(package)}; {found.file} was started")
         made = _added(made, name, node, found, where, known)
+        named[number] = made.processes[-1][0]
         if problem := made.starts[-1].problem:
             fault = Fault(0, name, FaultKind.KILLED, problem)
             return EvaluatedLaunch(fault=fault, left_out=tuple(left_out), unstarted=tuple(unstarted))
     if not (made.processes or left_out or unstarted or notes):
         text = "describes no node"
         return EvaluatedLaunch(fault=Fault(0, name, FaultKind.EXITED, text), notes=tuple(notes))
+    made = _arranged(made, name, report, named, plan.root)
     return replace(made, left_out=tuple(left_out), unstarted=tuple(unstarted), notes=tuple(notes))
+
+
+def _arranged(
+    made: EvaluatedLaunch, launch: str, report: LaunchReport, named: Mapping[int, str], root: str
+) -> EvaluatedLaunch:
+    """Return the processes sorted by when they start: with the launch file, or when something has happened.
+
+    Args:
+        made: All processes.
+        launch: The name of the launch file.
+        report: What it describes.
+        named: The process of each node, by the number of the node.
+        root: The folder of the submission.
+    """
+    starts = [step for step in report.steps if step.act == "start" and step.number in named]
+    plain = not report.handlers and all(step.act == "start" for step in report.steps)
+    if plain and not any(node.respawn for node in report.nodes):
+        late_ns = {named[step.number]: round(step.delay_s * NS_PER_S) for step in starts}
+        return replace(made, starts_ns=tuple((process, late_ns.get(process, 0)) for process, _ in made.processes))
+    nodes = {number: report.nodes[number] for number in named}
+    files = {number: dict(made.processes)[process] for number, process in named.items()}
+    service = LaunchService(launch, root, nodes, named, files, report.steps, report.handlers)
+    first = {named[number] for number in service.first}
+    return replace(
+        made,
+        processes=tuple(one for one in made.processes if one[0] in first),
+        later=tuple(one for one in made.processes if one[0] not in first),
+        service=service,
+    )
 
 
 def _not_done(name: str, report: LaunchReport, places: Places) -> tuple[list[str], list[tuple[str, str]], list[str]]:
@@ -272,14 +309,11 @@ def _added(  # noqa: PLR0913  what one node consists of
         given_parameters=_texts(node.parameters),
         given_remappings=tuple((_text(old), _text(new)) for old, new in node.remappings[:ARGUMENTS]),
     )
-    # Longer than any scenario is never; also NaN fails both comparisons.
-    delay_ns = round(node.delay_s * NS_PER_S) if 0 < node.delay_s < 1e6 else 0
     return replace(
         made,
         processes=(*made.processes, (process, found.file)),
         starts=(*made.starts, start),
         labels=(*made.labels, (process, label)),
-        starts_ns=(*made.starts_ns, (process, delay_ns)),
     )
 
 
@@ -360,7 +394,7 @@ def expanded(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> Plan:
         # The delays in a launch file count from its own start.
         begins = late.pop(name, 0)
         late |= {process: begins + delay for process, delay in made.starts_ns if begins + delay}
-        may_exit += [process for process, _ in made.processes if name in plan.may_exit]
+        may_exit += [process for process, _ in made.labels if name in plan.may_exit]
     return replace(
         plan,
         processes=tuple(processes),
@@ -380,6 +414,8 @@ def unstarted(plan: Plan, launched: Mapping[str, EvaluatedLaunch]) -> AssessedTr
 def renamed(trace: AssessedTrace, launched: Mapping[str, EvaluatedLaunch]) -> AssessedTrace:
     """Return a trace in which processes go by the names that a rubric uses, and which tells what was left out."""
     labels = {process: label for made in launched.values() for process, label in made.labels}
+    services = [made.service for made in launched.values() if made.service is not None]
+    labels |= {name: labels[first] for service in services for name, first in service.names.items()}
     left_out = tuple(one for made in launched.values() for one in made.left_out)
     unstarted = tuple(one for made in launched.values() for one in made.unstarted)
     notes = tuple(one for made in launched.values() for one in made.notes)

@@ -70,6 +70,7 @@ def _without_waiting(path: str, flags: int) -> int:
 _LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
     "action": ("the action {name}", re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,59}")),
     "command": ("the command {text}", None),
+    "handler": ("the event handler {name}", re.compile(r"On[A-Z][A-Za-z]{0,39}")),
     "launch_file": ("the launch file {name}", re.compile(r"[A-Za-z0-9_.-]{1,80}")),
     "module": ("what needs the package {name}", re.compile(r"[a-z0-9_]{1,80}")),
     "name": ("what needs {name}", re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*){0,6}", re.ASCII)),
@@ -83,6 +84,7 @@ _LEFT_OUT: Mapping[str, tuple[str, re.Pattern[str] | None]] = {
 }
 #: Why something is left out that would be understood otherwise, by its code.
 _WHY = {
+    "handler": "only lists of actions for the start or the end of a process are done",
     "launch_file": "its ending is not that of a launch file",
     "module": "this package is not installed",
     "nodes": "no more are started",

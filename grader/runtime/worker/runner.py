@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -22,6 +23,16 @@ from grader.runtime.stimuli.server import AddServer, PlannedServer, RemoveServer
 from grader.runtime.stimuli.simulation import Record, Step
 from grader.runtime.worker.core import Agenda, Taken
 from grader.runtime.worker.ending import never_stopped, reported_fault
+from grader.runtime.worker.launch_service import (
+    BeginNode,
+    DoLater,
+    KillNode,
+    LaunchDue,
+    LaunchService,
+    Order,
+    StopNode,
+    TellReader,
+)
 from grader.runtime.worker.observer import Observer
 from grader.runtime.worker.service_peers import LATER, ServicePeers
 from grader.runtime.worker.simulations import Simulations
@@ -29,6 +40,9 @@ from grader.runtime.worker.student_process import NodeProcess
 from grader.runtime.worker.topic_peers import TopicPeers
 from grader.runtime.worker.trace_recorder import OFFERS, TraceRecorder
 from grader.runtime.worker.transit import Transit
+
+#: Starts a process of a node that a launch file describes, by the number of the node, under a name.
+StartNode = Callable[[LaunchService, int, str], NodeProcess]
 
 
 class Runner(ABC):
@@ -63,6 +77,10 @@ class Runner(ABC):
         planned = events_in_order([*plan.events(), *self._simulations.events()])
         due = events_in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
         end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
+        self._services_of: dict[str, LaunchService] = {}  # by the processes that a launch file has started
+        self._launches: dict[int, tuple[LaunchService, StartNode]] = {}
+        #: The names of all processes that were started since launch files began, with the folder that each lies in.
+        self.launched: dict[str, str] = {}
         self._agenda = Agenda(due, dict(plan.starts_ns), end_ns)
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
         self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
@@ -77,6 +95,18 @@ class Runner(ABC):
             later=self._agenda.later,
             simulated=self._simulated,
         )
+
+    def add_launch(self, service: LaunchService, start: StartNode, begins_ns: int = 0) -> None:
+        """Take part in what a launch file does while its nodes run.
+
+        Args:
+            service: The launch file, whose first nodes are among the processes.
+            start: Starts another process of it.
+            begins_ns: When it begins, from now on.
+        """
+        self._launches[id(service)] = service, start
+        self._obey(service, service.begin(), self._time_ns() + begins_ns)
+        self._services_of |= dict.fromkeys(service.names, service)
 
     def run(self) -> AssessedTrace:
         """Run the plan to its end and return the trace."""
@@ -129,6 +159,18 @@ class Runner(ABC):
         """Send a process the stop signal, as Ctrl-C does."""
 
     @abstractmethod
+    def _signal_stop(self, student: NodeProcess) -> None:
+        """Let a process notice the stop signal, in the middle of a run."""
+
+    @abstractmethod
+    def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
+        """Let a process run after a time."""
+
+    @abstractmethod
+    def _lose(self, student: NodeProcess) -> None:
+        """Forget the endpoints of a process that was killed."""
+
+    @abstractmethod
     def _is_served(self, calls: PlannedCalls) -> bool:
         """Return whether the server for some calls exists and is matched."""
 
@@ -163,6 +205,8 @@ class Runner(ABC):
     def _shut_down(self) -> None:
         """Send the stop signal to every process, and continue until all have ended."""
         self._agenda.shut_down(self._time_ns(), self._plan.shutdown_ns)
+        for service, _ in self._launches.values():
+            service.interrupted()
         for student in self._students:
             if not student.ended:
                 student.stop_signalled = True
@@ -250,8 +294,71 @@ class Runner(ABC):
             self._offer_action(event.server.action, event.server.type, now_ns)
         elif isinstance(event, Attend):
             self._attend(event, now_ns)
+        elif isinstance(event, LaunchDue):
+            self._obey(event.service, event.service.perform(event.step), now_ns)
         else:
             self._do_service(event, now_ns)
+
+    def _note_start(self, student: NodeProcess) -> None:
+        """Tell the launch file of a process that it runs now; what follows from it is done next."""
+        if service := self._services_of.get(student.name):
+            self._obey(service, service.started(student.name), self._time_ns())
+
+    def _note_end(self, student: NodeProcess) -> None:
+        """Tell the launch file of a process that it has ended; what follows from it is done next."""
+        if service := self._services_of.get(student.name):
+            self._obey(service, service.ended(student.name), self._time_ns())
+
+    def _obey(self, service: LaunchService, orders: Iterable[Order], now_ns: int) -> None:
+        for order in orders:
+            match order:
+                case DoLater(step):
+                    self._agenda.later(LaunchDue.at(now_ns, service, step))
+                case BeginNode(node):
+                    self._begin_launched(service, node, now_ns)
+                case StopNode(name):
+                    self._stop_launched(self._named(name), now_ns)
+                case KillNode(name):
+                    self._kill(self._named(name))
+                case TellReader(text):
+                    self._recorder.note(text)
+
+    def _begin_launched(self, service: LaunchService, node: int, now_ns: int) -> None:
+        first = service.processes[node]
+        names = {student.name for student in self._students}
+        numbered = (f"{first} ({number})" for number in itertools.count(2))
+        name = first if first not in names else next(one for one in numbered if one not in names)
+        if first in self._plan.may_exit and name != first:
+            self._plan = replace(self._plan, may_exit=(*self._plan.may_exit, name))
+        student = self._launches[id(service)][1](service, node, name)
+        service.began(node, name)
+        self._services_of[name] = service
+        self.launched[name] = service.root
+        self._students.append(student)
+        self._agenda.starts_ns[name] = max(1, now_ns)  # it is marked as one that starts late
+        self._begin_process(student, 0)
+
+    def _stop_launched(self, student: NodeProcess, now_ns: int) -> None:
+        if not (student.ended or student.stop_signalled):
+            student.stop_signalled = True
+            self._recorder.add(Mark(now_ns, "stop_signal", student.name))
+            self._signal_stop(student)
+
+    def _named(self, process: str) -> NodeProcess:
+        return next(student for student in self._students if student.name == process)
+
+    def _kill(self, student: NodeProcess) -> None:
+        """End a process at once."""
+        if student.ended:
+            return
+        student.end_now()
+        student.death(self._time_ns())
+        student.drain()
+        self._recorder.add(*student.output(self._time_ns(), final=True))
+        self._lose(student)
+        self._recorder.add(Mark(self._time_ns(), "stopped", student.name))
+        student.ended = True
+        self._note_end(student)
 
     def _do_service(self, event: Event, now_ns: int) -> None:
         """Execute one event of a server or client."""

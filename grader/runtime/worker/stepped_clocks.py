@@ -170,9 +170,6 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
         drawn = choose if self._plan.drawn_order else None
         return Core(self._students, self._agenda, includes_end=True, choose=drawn, held=held)
 
-    def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
-        self._core.waits(student, self._core.now_ns + delay_ns)
-
     def _await_start(self, started: Sequence[NodeProcess]) -> None:
         del started
         self._advance(self._core.now_ns)
@@ -184,10 +181,6 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
     def _await_end(self, student: NodeProcess) -> None:
         del student
         self._advance(self._core.now_ns)
-
-    def _lose(self, student: NodeProcess) -> None:
-        self._discovery.lose(student)
-        self._core.ended(student)
 
 
 class WallSteppedRunner(SteppedRunner, WallRunner):
@@ -235,8 +228,9 @@ class WallSteppedRunner(SteppedRunner, WallRunner):
         return changed
 
     def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
-        if not delay_ns:
+        if not delay_ns and student.name not in self._agenda.starts_ns:
             student.tell(Go())
+            self._note_start(student)
 
     def _await_start(self, started: Sequence[NodeProcess]) -> None:
         others = len(self._observer.students_nodes())
@@ -251,9 +245,6 @@ class WallSteppedRunner(SteppedRunner, WallRunner):
 
     def _await_end(self, student: NodeProcess) -> None:
         self._await(lambda: student.ended, self._time_ns() + ENDS_NS)
-
-    def _lose(self, student: NodeProcess) -> None:
-        """Do nothing: the middleware itself notices after a while that nobody answers."""
 
     def _await_readers(self, offer: PlannedMessages) -> None:
         reliability = "best_effort" if offer.best_effort else "reliable"

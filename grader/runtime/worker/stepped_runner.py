@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
@@ -39,16 +40,32 @@ from grader.runtime.stimuli.goals import goal_call
 from grader.runtime.stimuli.messages import Advertise, PlannedMessages
 from grader.runtime.stimuli.recorded import PublishRecorded
 from grader.runtime.stimuli.server import AddServer, PlannedServer
+from grader.runtime.worker.launch_service import LaunchService
 from grader.runtime.worker.observer import Observer
-from grader.runtime.worker.runner import Runner
+from grader.runtime.worker.runner import Runner, StartNode
 from grader.runtime.worker.service_peers import check_fields
 from grader.runtime.worker.student_process import NodeProcess
 
-#: Starts the processes of a plan; returns each with the time to wait before it runs, in nanoseconds. What a launch file
-#: asks for and nobody starts is added to the list, as sentences.
-Starter = Callable[[Plan, list[str]], Iterable[tuple[NodeProcess, int]]]
+#: Starts the processes of a plan; returns each with the time to wait before it runs, in nanoseconds, and fills in what
+#: a launch file has besides.
+Starter = Callable[[Plan, "LaunchedBesides"], Iterable[tuple[NodeProcess, int]]]
 #: Asks the other side, which answers with a value that fits the question.
 Question = Callable[[Mapping[str, Any]], Any]
+
+
+@dataclass
+class LaunchedBesides:
+    """What a launch file has besides the processes that it starts.
+
+    Attributes:
+        left_out: Sentences about what it asks for and nobody starts.
+        service: What it does while its nodes run; None for one that does nothing more, and without a launch file.
+        start: Starts another process of it.
+    """
+
+    left_out: list[str] = field(default_factory=list)
+    service: LaunchService | None = None
+    start: StartNode | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,20 +208,12 @@ class SteppedRunner(Runner):
         """Let time pass until a moment, or at least until now; with `until_news`, until something was observed."""
 
     @abstractmethod
-    def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
-        """Let a process run after a time."""
-
-    @abstractmethod
     def _await_start(self, started: Sequence[NodeProcess]) -> None:
         """Let each of some new processes run until it waits for something."""
 
     @abstractmethod
     def _await_end(self, student: NodeProcess) -> None:
         """Let a process react to the stop signal."""
-
-    @abstractmethod
-    def _lose(self, student: NodeProcess) -> None:
-        """Forget the endpoints of a process that was killed."""
 
     def _await_readers(self, offer: PlannedMessages) -> None:
         """Wait until the subscriptions that are there would hear a publisher."""
@@ -213,21 +222,20 @@ class SteppedRunner(Runner):
 
     def _begin_processes(self, command: StartProcesses) -> dict[str, Any]:
         started: list[NodeProcess] = []
-        left_out: list[str] = []
-        for student, delay_ns in self._start(command.plan, left_out):
+        besides = LaunchedBesides()
+        for student, delay_ns in self._start(command.plan, besides):
             self._students.append(student)
             if delay_ns:
                 self._agenda.starts_ns[student.name] = self._time_ns() + delay_ns
             self._begin_process(student, delay_ns)
             started.append(student)
+        if besides.service is not None and besides.start is not None:
+            self.add_launch(besides.service, besides.start)
         if command.settle:
             self._await_start([student for student in started if student.name not in self._agenda.starts_ns])
         # what starts later has declared nothing yet
         given = [(one.name, *one.given) for one in started if one.name not in self._agenda.starts_ns]
-        return {"started": [student.name for student in started], "left_out": left_out, "given": given}
-
-    def _named(self, process: str) -> NodeProcess:
-        return next(student for student in self._students if student.name == process)
+        return {"started": [student.name for student in started], "left_out": besides.left_out, "given": given}
 
     def _interrupt_now(self, student: NodeProcess) -> None:
         if student.ended or student.stop_signalled:
@@ -236,17 +244,6 @@ class SteppedRunner(Runner):
         self._recorder.add(Mark(self._time_ns(), "stop_signal", student.name))
         self._interrupt(student)
         self._await_end(student)
-
-    def _kill(self, student: NodeProcess) -> None:
-        if student.ended:
-            return
-        student.end_now()
-        student.death(self._time_ns())
-        student.drain()
-        self._recorder.add(*student.output(self._time_ns(), final=True))
-        self._lose(student)
-        self._recorder.add(Mark(self._time_ns(), "stopped", student.name))
-        student.ended = True
 
     # -------------------------------------------------------------- stimuli
 

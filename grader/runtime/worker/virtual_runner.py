@@ -128,6 +128,16 @@ class VirtualRunner(Runner):
     def _interrupt(self, student: NodeProcess) -> None:
         self._carry_out(self._core.run(student))
 
+    def _signal_stop(self, student: NodeProcess) -> None:
+        student.nudged = True
+
+    def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
+        self._core.waits(student, self._core.now_ns + delay_ns)
+
+    def _lose(self, student: NodeProcess) -> None:
+        self._discovery.lose(student)
+        self._core.ended(student)
+
     def _step(self, run: RunProcess[NodeProcess]) -> None:
         """Send a process the time and the messages on their way to it, and handle its reports."""
         student, now_ns, epoch_ns = run.process, self._core.now_ns, self._plan.epoch_ns
@@ -141,6 +151,7 @@ class VirtualRunner(Runner):
         order = self._core.step if self._draws() else None
         student.tell(Go(epoch_ns + now_ns, free_ns, run.arrivals, interrupt, released, order))
         student.stopping = student.stop_signalled
+        self._note_start(student)
         self._hear(student, workload)
         self._remove_done()
         # A flood is wrong on every clock. It runs until its limit, which is the same on every machine.
@@ -316,6 +327,7 @@ class VirtualRunner(Runner):
     def _end(self, student: NodeProcess, *endings: Fault | Mark) -> None:
         self._recorder.add(*endings)
         self._core.ended(student)
+        self._note_end(student)
 
     def _remove_done(self) -> None:
         """Remove the servers that have given their last answer, once it has arrived."""

@@ -121,6 +121,7 @@ class WallRunner(Runner):
         for student in self._students:
             if student.name not in self._agenda.starts_ns:
                 student.tell(Go())
+                self._note_start(student)
 
     def _run_on(self) -> None:
         """Poll until the end, or until nothing more can happen."""
@@ -158,6 +159,15 @@ class WallRunner(Runner):
     def _interrupt(self, student: NodeProcess) -> None:
         student.tell(Stop())
 
+    _signal_stop = _interrupt
+
+    def _begin_process(self, student: NodeProcess, delay_ns: int) -> None:
+        self._agenda.starts_ns[student.name] = max(1, self._time_ns() + delay_ns)
+        self._looked_ns = self._time_ns()  # starting a process takes long, and is not what holds the loop up
+
+    def _lose(self, student: NodeProcess) -> None:
+        """Do nothing: the middleware itself notices after a while that nobody answers."""
+
     def _harness_problem(self) -> str:
         """Report that the machine was too busy, unless the nodes themselves delayed the loop."""
         if self.held_up_ns <= HELD_UP_NS or self._recorder.full or self.fills_machine():
@@ -181,6 +191,7 @@ class WallRunner(Runner):
                 del self._agenda.starts_ns[student.name]
                 self._recorder.add(Mark(now_ns, "process_starts", student.name))
                 student.tell(Go())
+                self._note_start(student)
             self._hear(student, now_ns)
         for taken in self._observer.take(MESSAGES_A_LOOK):
             self._record(now_ns, taken, arrived_ns=self._arrived(taken.arrived_ns, now_ns))
@@ -221,6 +232,7 @@ class WallRunner(Runner):
             if report is None:
                 self._recorder.add(*student.output(now_ns, final=True), student.death(now_ns))
                 student.ended = True
+                self._note_end(student)
             elif isinstance(report, Note):
                 student.note(report)
             elif isinstance(report, EarlyMessage):
@@ -235,6 +247,7 @@ class WallRunner(Runner):
                 student.exit_code = report.code
                 self._recorder.add(ending(student.name, now_ns, report, self._plan, places, stopped=stopped))
                 student.ended = True
+                self._note_end(student)
         self._recorder.add(*student.output(now_ns))
 
     def _note_parameters(self, student: NodeProcess, report: Parameters, now_ns: int) -> None:

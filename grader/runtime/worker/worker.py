@@ -47,6 +47,7 @@ from grader.runtime.worker.bare_start import BareProcess, bare_arguments
 from grader.runtime.worker.beside import files_beside, is_loose, whole_submission
 from grader.runtime.worker.conversation import Conversation
 from grader.runtime.worker.ending import BLOCKED_S, START_CPU_S, WAKE_UP_CPU_S
+from grader.runtime.worker.launch_service import LaunchService
 from grader.runtime.worker.launching import MOST, EvaluatedLaunch, evaluated, expanded, renamed, unstarted
 from grader.runtime.worker.notes import Places
 from grader.runtime.worker.output_watch import OutputWatch
@@ -55,7 +56,8 @@ from grader.runtime.worker.socket_memory import SocketMemory
 from grader.runtime.worker.student_process import LOG_FORMAT, NodeProcess
 
 if TYPE_CHECKING:
-    from grader.runtime.worker.runner import Runner
+    from grader.runtime.worker.runner import Runner, StartNode
+    from grader.runtime.worker.stepped_runner import LaunchedBesides
 
 #: Real seconds that a program has, on an idle machine, to end after the stop signal and to report what it wrote. Hardly
 #: any needs a tenth of it; only one that goes on regardless takes so long.
@@ -143,9 +145,10 @@ class Worker:
         students: list[NodeProcess] = []
         failed = False
 
-        def start(added: Plan, left_out: list[str]) -> Iterator[tuple[NodeProcess, int]]:
+        def start(added: Plan, besides: LaunchedBesides) -> Iterator[tuple[NodeProcess, int]]:
             sys.path += [folder for folder in added.interfaces if folder not in sys.path]  # installed ones come first
-            added = self._with_launched(added, domain, {student.name for student in students}, left_out)
+            added = self._with_launched(added, domain, {student.name for student in students}, besides)
+            besides.start = self._node_starter(added, domain, lambda student: processes.callback(stop_now, student))
             for name, file in added.processes:
                 student = self._start(added, name, file, domain)
                 processes.callback(stop_now, student)
@@ -177,6 +180,7 @@ class Worker:
                     answer = {"problem": error.message, "launch_failed": isinstance(error, LaunchFailedError)}
                 news = [_compact(o) if plan.working else _whole(o) for o in runner.news()]
                 common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
+                common["begun"] = runner.launched
                 is_last = isinstance(command, Finish)
                 last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()} if is_last else {}
                 other.tell({**answer, **common, **last})
@@ -186,18 +190,39 @@ class Worker:
         odd = not plan.working and (runner.is_odd or self._remembers_connections())
         return failed or odd or usage([os.getpid()]).memory_bytes > WORN_BYTES
 
-    def _with_launched(self, plan: Plan, domain: int, used: Collection[str], left_out: list[str]) -> Plan:
+    def _node_starter(self, plan: Plan, domain: int, begun: Callable[[NodeProcess], object]) -> StartNode:
+        """Return what starts a node that the launch files of a plan describe.
+
+        Args:
+            plan: Says how each node is started.
+            domain: The ROS domain.
+            begun: Called with each process.
+        """
+
+        def start(service: LaunchService, node: int, name: str) -> NodeProcess:
+            given = replace(plan.start_of(service.processes[node]), process=name)
+            under = replace(plan, starts=(given, *plan.starts))
+            student = (self._start_bare if plan.bare else self._start)(under, name, service.files[node], domain)
+            begun(student)
+            if not plan.bare:
+                _await_ready(student)
+            return student
+
+        return start
+
+    def _with_launched(self, plan: Plan, domain: int, used: Collection[str], besides: LaunchedBesides) -> Plan:
         """Return a plan with the nodes of its launch file, by names that no process has; the plan itself without one.
 
-        Raises HarnessError if the launch file describes nothing that can be started, and adds what it leaves out.
+        Raises HarnessError if the launch file describes nothing that can be started, and fills in what it has besides.
         """
         launch = next(((name, file) for name, file in plan.processes if is_launch_file(name)), None)
         if launch is None:
             return plan
         name, file = launch
         made = self._evaluate(plan, name, file, domain, Budget(plan.limits.wall_ns, ""))
+        left_out = besides.left_out
         left_out += [*made.left_out, *(text for text, _ in made.unstarted)]
-        if made.harness_problem or made.fault is not None or not made.processes:
+        if made.harness_problem or made.fault is not None or not made.labels:
             fault = made.fault
             place = name if fault is None or not fault.file else f"{fault.file}:{fault.line}"
             if fault is None and not made.harness_problem:  # the sentences name the place themselves
@@ -206,12 +231,13 @@ class Worker:
             failed = LaunchFailedError if not made.harness_problem else HarnessError
             raise failed(f"{place}: {why}")
         names: dict[str, str] = {}
-        for process, _ in made.processes:
+        for process, _ in (*made.processes, *made.later):
             label = process.removeprefix(f"{name} ")
             others = {*used, *names.values()}
             numbered = (f"{label} ({number})" for number in itertools.count(2))
             names[process] = label if label not in others else next(one for one in numbered if one not in others)
         found = expanded(plan, {name: made})
+        besides.service = made.service.renamed(names) if made.service is not None else None
         return replace(
             found,
             processes=tuple((names.get(process, process), file) for process, file in found.processes),
@@ -234,9 +260,14 @@ class Worker:
             return AssessedTrace(
                 plan.scenario, ClockKind(plan.clock), stop_ns=0, observations=(), harness_problem=problem
             )
-        if any(made.fault is not None or not made.processes for made in launched.values()):
+        if any(made.fault is not None or not made.labels for made in launched.values()):
             return unstarted(plan, launched)
-        recorded = self._record_processes(expanded(plan, launched), domain, budget.after(started_ns))
+        services = [
+            (made.service, dict(plan.starts_ns).get(name, 0))
+            for name, made in launched.items()
+            if made.service is not None
+        ]
+        recorded = self._record_processes(expanded(plan, launched), domain, budget.after(started_ns), services)
         return renamed(recorded, launched)
 
     def _evaluate(self, plan: Plan, name: str, file: str, domain: int, budget: Budget) -> EvaluatedLaunch:
@@ -256,7 +287,9 @@ class Worker:
             made = evaluated(students[0], plan)
             return made if made.fault is None else replace(made, harness_problem=monitor.problem)
 
-    def _record_processes(self, plan: Plan, domain: int, budget: Budget) -> AssessedTrace:
+    def _record_processes(
+        self, plan: Plan, domain: int, budget: Budget, services: Sequence[tuple[LaunchService, int]]
+    ) -> AssessedTrace:
         students: list[NodeProcess] = []
         with ExitStack() as stack:
             stack.callback(stop, students)
@@ -284,6 +317,8 @@ class Worker:
             if plan.clock == ClockKind.WALL.value:
                 stack.enter_context(OutputWatch(students, observer.wake))
             run = runner(plan, students, observer)
+            for service, begins_ns in services:
+                run.add_launch(service, self._node_starter(plan, domain, lambda _: None), begins_ns)
             run.fills_machine = lambda: monitor.fills_machine
             trace = monitor.reviewed(run.run())
             if not plan.bare:

@@ -26,7 +26,9 @@ from grader.runtime.host.protocol import (
     Go,
     Idle,
     LaunchedNode,
+    LaunchHandler,
     LaunchReport,
+    LaunchStep,
     Matched,
     MessagesArrived,
     NeverSent,
@@ -113,15 +115,22 @@ REPORTS: tuple[Report, ...] = (
                 ["a"],
                 ["-r"],
                 [("x.yaml", "a: 1")],
-                2.5,
                 "a.launch.py",
                 3,
                 ["a"],
                 [["b", "c"]],
+                respawn=True,
+                respawn_delay_s=2.5,
+                respawn_most=3,
             )
         ],
         [NotEvaluated("command", "x", "ls", 2, True, "a.launch.py", 4)],
         FAULT,
+        [LaunchStep("start", 0, 1.5), LaunchStep("register", 0)],
+        [
+            LaunchHandler("exit", 0, once=True, steps=[LaunchStep("shutdown", 0, 2.0)]),
+            LaunchHandler("shutdown", steps=[]),
+        ],
     ),
 )
 COUNTERPARTS = Counterparts(
@@ -202,9 +211,12 @@ def test_an_object_that_the_host_never_sends_is_unknown(line: bytes) -> None:
 NAMES = {name for kind in vars(protocol).values() for name in getattr(kind, "_fields", ())} | {
     *protocol._KINDS.values()
 }
-#: What is no part of the conversation: by module and variable, what processes and programs are started with.
+#: What is no part of the conversation: by module and variable, what processes and programs are started with, and what
+#: a launch file gives its actions.
 REQUESTS = {
     ("host/entry.py", "request"),
+    ("host/launch/markup.py", "more"),
+    ("host/launch/nodes.py", "self.more"),
     ("host/program.py", "request"),
     ("host/program.py", "told"),
     ("host/starter.py", "told"),

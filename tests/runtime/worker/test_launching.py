@@ -30,9 +30,7 @@ Edit = tuple[str, str, str]
 def graded(tmp_path: Path) -> Callable[..., ExerciseReport]:
     """Grade the workspace with some of its text replaced."""
 
-    def grade(
-        *edits: Edit, rubric: str = "launched.yaml", clock: str = "virtual", time_budget_s: float = 300.0
-    ) -> ExerciseReport:
+    def grade(*edits: Edit, rubric: str = "launched.yaml", clock: str = "virtual", **options: Any) -> ExerciseReport:
         folder = tmp_path / "ws"
         shutil.copytree(WORKSPACE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
         for name, old, new in edits:
@@ -41,7 +39,7 @@ def graded(tmp_path: Path) -> Callable[..., ExerciseReport]:
             assert old in text
             file.write_text(text.replace(old, new))
         rubrics = (HERE / "rubrics" / rubric,)
-        request = GradeRequest(str(folder), rubrics=rubrics, clock=clock, time_budget_s=time_budget_s)
+        request = GradeRequest(str(folder), rubrics=rubrics, clock=clock, **{"time_budget_s": 300.0, **options})
         return grade_until_decided(request).exercises[0]
 
     return grade
@@ -65,6 +63,48 @@ def test_a_launch_file_starts_its_nodes(graded: Callable[..., ExerciseReport]) -
     listener = "src/robot/launch/listener.launch.py"
     assert f"started by {listener}:{line_of(listener, 'Node(')}" in notes
     assert {start.process for start in report.starts} == {"robot.launch.py"}
+
+
+CONDITION = 'condition=IfCondition(LaunchConfiguration("listen")),\n            )'
+#: The listener is started by an event handler, and the talker, which ends after 1.9 s, is started again.
+EVENTS: tuple[Edit, ...] = (
+    (LAUNCH, "import DeclareLaunchArgument,", "import RegisterEventHandler, DeclareLaunchArgument,"),
+    (LAUNCH, "from launch.conditions", "from launch.event_handlers import OnProcessStart\nfrom launch.conditions"),
+    (LAUNCH, "GroupAction(\n", "RegisterEventHandler(OnProcessStart(on_start=[GroupAction(\n"),
+    (LAUNCH, CONDITION, f"{CONDITION}], handle_once=True))"),
+    (LAUNCH, 'output="screen",', 'output="screen", respawn=True, respawn_delay=0.1,'),
+    (NODES, "self.count = 0", "self.count = 0\n        self.create_timer(1.9, rclpy.shutdown)"),
+)
+
+
+def may_end(folder: Path) -> str:
+    """Write the rubric for nodes that may end by themselves, and return its path."""
+    text = (HERE / "rubrics" / "launched.yaml").read_text()
+    free = text.replace("observe:", "may_exit: [robot.launch.py]\n    observe:")
+    # in real time, a node that starts after another one misses its first messages
+    free = free.replace("word 3", "word [0-9]+")
+    (folder / "free.yaml").write_text(free.replace("0.2 Hz", "0.6 Hz").replace("0.3 Hz", "1 Hz"))
+    return str(folder / "free.yaml")
+
+
+def test_nodes_are_started_again_and_by_event_handlers(graded: Callable[..., ExerciseReport], tmp_path: Path) -> None:
+    """Under the name of the launch file, and with what it gives them."""
+    report = graded(*EVENTS, rubric=may_end(tmp_path))
+    assert set(outcomes(report).values()) == {"met"}, [
+        v.reason for v in report.verdicts if v.outcome is not Outcome.MET
+    ]
+    assert len(report.starts) >= 2
+    without = graded(*EVENTS, (LAUNCH, "respawn=True", "respawn=False"), rubric=may_end(tmp_path))
+    assert outcomes(without)["rate"] == outcomes(without)["faster"] == "not_met"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("clock", ["auto", "wall"])
+def test_other_clocks_have_event_handlers(graded: Callable[..., ExerciseReport], tmp_path: Path, clock: str) -> None:
+    """A spot check, whose processes have nothing of the grader in them, and the wall clock."""
+    report = graded(*EVENTS[:4], rubric=may_end(tmp_path), clock=clock, spot_checks=float(clock == "auto"))
+    assert set(outcomes(report).values()) == {"met"}, report
+    assert report.clock.value == ("wall" if clock == "wall" else "virtual")
 
 
 @pytest.mark.nightly

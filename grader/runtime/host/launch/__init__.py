@@ -11,6 +11,7 @@ module of this package:
 | `modules` | which names the modules have that launch files import |
 | `files` | what a launch file describes, and the action that includes another one |
 | `nodes`, `parameters` | the actions that describe nodes, and the parameters of these |
+| `handlers` | what is done when a process starts or ends, and at the end of all |
 | `actions`, `conditions`, `substitutions` | what else is evaluated of `launch` |
 | `entities` | what a launch description consists of, and how it is visited |
 | `unknown` | what stands for everything that ROS has and that is not evaluated |

@@ -102,7 +102,9 @@ class OpaqueFunction(Action):
         self.args, self.kwargs = () if args is None else args, {} if kwargs is None else kwargs
 
     def execute(self, context: Context) -> Iterable[Any]:
-        """Call it."""
+        """Call it; what it would return when an event happens is not known before."""
+        if context.in_handler:
+            raise LeftOutError("action", "OpaqueFunction")
         made = self.function(context, *self.args, **self.kwargs)
         if made is not None and not isinstance(made, Iterable):
             raise TypeError(f"expected a list of actions from {_called(self.function)}, found {type(made).__name__}")
@@ -145,11 +147,19 @@ def _set_environment(context: Context, name: Any, value: Any = "", *_: Any) -> N
         raise LeftOutError("variable", variable)
 
 
+def _log(context: Context, message: Any) -> None:
+    try:
+        text_of(message, context)
+    except LeftOutError:
+        if not context.in_handler:  # there, messages are about the event, and change nothing for the nodes
+            raise
+
+
 #: By the name that each has in `launch.actions`.
 ACTIONS: dict[str, Any] = {
     "DeclareLaunchArgument": DeclareLaunchArgument,
     "GroupAction": GroupAction,
-    "LogInfo": setting_action("LogInfo", lambda context, msg: text_of(msg, context)),
+    "LogInfo": setting_action("LogInfo", _log),
     "OpaqueFunction": OpaqueFunction,
     "SetEnvironmentVariable": setting_action("SetEnvironmentVariable", _set_environment),
     "SetLaunchConfiguration": SetLaunchConfiguration,

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..protocol import LaunchedNode, NotEvaluated
+from ..protocol import LaunchedNode, LaunchHandler, LaunchStep, NotEvaluated
 from .left_out import LeftOutError
 from .package_names import PackageNotFoundError, meant_by
 from .places import written_at
@@ -47,11 +47,21 @@ class Context:
         #: Reads a launch file that is not in Python, by its path.
         self.read_markup: Callable[[str, Context], Any] | None = None
         self.nodes: list[LaunchedNode] = []
+        #: What is done when the launch file begins, or by the event handler that is described now.
+        self.steps: list[LaunchStep] = []
+        self.handlers: list[LaunchHandler] = []
+        #: Describes the handlers that were registered, once everything else is described.
+        self.undescribed: list[Callable[[Context], None]] = []
+        self.in_handler = False
         self.left_out: list[NotEvaluated] = []
 
     def perform_substitution(self, value: Any) -> str:
         """Return the text of a substitution."""
         return text_of(value, self)
+
+    def do(self, what: str, number: int = 0) -> None:
+        """Note what the launch file does here, after the delay of the timers around it."""
+        self.steps.append(LaunchStep(what, number, self.delay_s))
 
     def scope(self) -> tuple[Any, ...]:
         """Return a copy of everything that a group restores at its end."""

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..protocol import LaunchedNode, NotEvaluated
+from ..protocol import LaunchReport
 from .context import Context, begin_evaluation
 from .entities import walk
 from .files import description_in
@@ -27,7 +27,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
     prefix: str = "",
     most_nodes: int,
     most_left_out: int,
-) -> tuple[list[LaunchedNode], list[NotEvaluated]]:
+) -> LaunchReport:
     """Evaluate a launch file; raises whatever it raises.
 
     Args:
@@ -40,7 +40,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
         most_left_out: So many things are said to be left out.
 
     Returns:
-        The nodes, and what was left out.
+        The nodes, what is done with them and when, and what was left out.
     """
     place_files_in(folders)
     shares = Shares(packages, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), prefix)
@@ -54,6 +54,8 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
     context.files.append(path)
     try:
         walk(description_in(path, context).entities, context)
+        while context.undescribed:
+            context.undescribed.pop(0)(context)
     except LeftOutError as error:
         _leave_out_all(context, path, error)
     except OSError as error:
@@ -62,7 +64,7 @@ def describe(  # noqa: PLR0913  what to evaluate, with what, and how much of it
             raise
         left_out.place = place_in(error)
         _leave_out_all(context, path, left_out)
-    return context.nodes, context.left_out
+    return LaunchReport(context.nodes, context.left_out, steps=context.steps, handlers=context.handlers)
 
 
 def _leave_out_all(context: Context, path: str, error: LeftOutError) -> None:

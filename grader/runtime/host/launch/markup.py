@@ -13,6 +13,7 @@ from .conditions import IfCondition, UnlessCondition
 from .context import Context, Substitution, word_for
 from .entities import Action, LaunchDescription
 from .files import IncludeLaunchDescription
+from .handlers import EVENT_ACTIONS
 from .nodes import ROS_ACTIONS, ExecuteProcess, Node
 from .parameters import ParameterFile, ParameterValue
 from .places import folders_with_places
@@ -235,7 +236,7 @@ def _node(_: _Reader, element: _Element) -> Action:
     known = ("pkg", "exec", "name", "node-name", "exec_name", "namespace", "args", "ros_args", *_OF_PROCESS)
     element.refuse_others((*known, *_CONDITIONS), ("param", "remap", "env"))
     name, namespace = element.text("name"), element.text("namespace")
-    more = {one: True for one in ("respawn",) if (element.text(one) or "false").casefold() == "true"}
+    more = _at_end(element)
     more |= {"prefix": True} if element.text("launch-prefix") else {}
     more |= {"env": True} if element.all("env") else {}
     return Node(
@@ -251,10 +252,28 @@ def _node(_: _Reader, element: _Element) -> Action:
     )
 
 
-#: Attributes of programs that change nothing for what a node does, and two that are left out.
+def _at_end(element: _Element) -> dict[str, Any]:
+    """Return what is done when a program has ended, as the arguments of its action."""
+    more: dict[str, Any] = {}
+    if (respawn := element.text("respawn")) is not None:
+        more["respawn"] = substituted(respawn)
+    if (delay_s := element.text("respawn_delay")) is not None:
+        more["respawn_delay"] = float(delay_s)
+        if not more["respawn_delay"] >= 0:
+            raise ValueError(f"respawn_delay: expected a number of seconds from 0, found {delay_s}")
+    if (most := element.text("respawn_max_retries")) is not None:
+        more["respawn_max_retries"] = int(most)
+    if (on_exit := element.text("on_exit")) is not None:
+        if on_exit != "shutdown":
+            raise ValueError(f"on_exit: expected shutdown, found {on_exit}")
+        more["on_exit"] = [EVENT_ACTIONS["Shutdown"]()]
+    return more
+
+
+#: Attributes of programs that change nothing for what a node does, those for its end, and one that is left out.
 _OF_PROCESS = (
-    *("output", "output_format", "emulate_tty", "cwd", "respawn", "respawn_delay", "respawn_max_retries", "shell"),
-    *("sigterm_timeout", "sigkill_timeout", "launch-prefix", "cached_output", "log_cmd"),
+    *("output", "output_format", "emulate_tty", "cwd", "shell", "sigterm_timeout", "sigkill_timeout", "cached_output"),
+    *("log_cmd", "respawn", "respawn_delay", "respawn_max_retries", "on_exit", "launch-prefix"),
 )
 
 
@@ -351,7 +370,13 @@ def _timer(reader: _Reader, element: _Element) -> Action:
 
 def _executable(_: _Reader, element: _Element) -> Action:
     element.refuse_others(("cmd", "name", *_OF_PROCESS, *_CONDITIONS), ("env",))
-    return ExecuteProcess(cmd=_words(element.needed("cmd")))
+    return ExecuteProcess(cmd=_words(element.needed("cmd")), **_at_end(element))
+
+
+def _shutdown(_: _Reader, element: _Element) -> Action:
+    element.refuse_others(("reason", *_CONDITIONS), ())
+    made: Action = EVENT_ACTIONS["Shutdown"](reason=element.text("reason") or "")
+    return made
 
 
 def _setting(kind: Callable[..., Action], *names: str) -> Callable[[_Reader, _Element], Action]:
@@ -389,6 +414,7 @@ _TAGS: Mapping[str, Callable[[_Reader, _Element], Action]] = {
     "set_parameter": _set_parameter,
     "set_remap": _setting(ROS_ACTIONS["SetRemap"], "from", "to"),
     "set_use_sim_time": _set_use_sim_time,
+    "shutdown": _shutdown,
     "timer": _timer,
 }
 

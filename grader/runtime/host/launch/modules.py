@@ -9,7 +9,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-from . import actions, conditions, entities, files, nodes, parameters, ros_modules, ros_names, substitutions
+from . import actions, conditions, entities, files, handlers, nodes, parameters, ros_modules, ros_names, substitutions
 from .context import Context, LaunchContext, Substitution, text_of
 from .package_index import ament_index
 from .unknown import Lacking, like_ros, stand_in_for
@@ -39,6 +39,7 @@ MODULES: dict[str, dict[str, Any]] = {
     },
     "launch.actions": {
         **actions.ACTIONS,
+        **handlers.EVENT_ACTIONS,
         **_by_name(entities.Action, nodes.ExecuteProcess, files.IncludeLaunchDescription),
     },
     "launch.conditions": _by_name(
@@ -47,6 +48,8 @@ MODULES: dict[str, dict[str, Any]] = {
         conditions.LaunchConfigurationEquals,
         conditions.LaunchConfigurationNotEquals,
     ),
+    "launch.event_handlers": handlers.HANDLERS,
+    "launch.events": handlers.EVENTS,
     "launch.launch_description_sources": dict(files.SOURCES),
     "launch.substitutions": substitutions.SUBSTITUTIONS,
     "launch.logging": {"get_logger": logging.getLogger},

@@ -9,8 +9,9 @@ from typing import Any
 
 from ..protocol import LaunchedNode
 from .actions import setting_action
-from .context import Context, text_of
-from .entities import Action
+from .context import Context, text_of, truth_of
+from .entities import walk
+from .handlers import ProcessAction, handle_exits
 from .left_out import LeftOutError
 from .package_names import meant_by
 from .parameters import Parameter, ParameterFile, evaluated_parameter, flattened, read_parameter_file, yaml_text
@@ -18,15 +19,17 @@ from .unknown import Lacking, items_of, pairs_of
 
 #: What a process is given that has no meaning for its node.
 _IGNORED = {
-    *("output", "output_format", "emulate_tty", "log_cmd", "exec_name", "respawn_delay", "respawn_max_retries"),
+    *("output", "output_format", "emulate_tty", "log_cmd", "exec_name"),
     *("sigterm_timeout", "sigkill_timeout", "cached_output", "cwd", "shell"),
 }
 
 
-_NOT_SUPPORTED = ("prefix", "env", "additional_env", "on_exit", "respawn")
+_NOT_SUPPORTED = ("prefix", "env", "additional_env")
+#: What is done when a process has ended.
+_AT_END = ("on_exit", "respawn", "respawn_delay", "respawn_max_retries")
 
 
-class Node(Action):
+class Node(ProcessAction):
     """A program of a package, with what it is started with."""
 
     def __init__(  # noqa: PLR0913  as in launch_ros
@@ -44,7 +47,7 @@ class Node(Action):
         **more: Any,
     ) -> None:
         super().__init__(condition=condition)
-        unknown = [name for name in more if name not in (*_IGNORED, *_NOT_SUPPORTED)]
+        unknown = [name for name in more if name not in (*_IGNORED, *_NOT_SUPPORTED, *_AT_END)]
         if unknown:
             raise TypeError(f"{type(self).__name__}() got an unexpected keyword argument '{unknown[0]}'")
         self.package, self.executable, self.name, self.namespace = package, executable, name, namespace
@@ -55,7 +58,10 @@ class Node(Action):
         self.arguments, self.ros_arguments, self.more = items_of(arguments), items_of(ros_arguments), more
 
     def execute(self, context: Context) -> Iterable[Any]:
-        """Describe the node."""
+        """Describe the node, and what is done at its end."""
+        if self.number is not None:
+            self.start_again(context)
+            return ()
         if len(context.nodes) >= context.most_nodes:
             raise LeftOutError("nodes")
         for name in _NOT_SUPPORTED:
@@ -85,14 +91,35 @@ class Node(Action):
                 [text_of(one, context) for one in self.arguments],
                 [*ros, *(text_of(one, context) for one in self.ros_arguments)],
                 texts,
-                context.delay_s,
                 self.file,
                 self.line,
                 named,
                 [[old, new] for old, new in own],
+                *self._respawned(context),
             )
         )
+        self.number = len(context.nodes) - 1
+        context.do("start", self.number)
+        if (on_exit := self.more.get("on_exit")) is not None:
+            handle_exits(self, on_exit, context)
         return ()
+
+    def _respawned(self, context: Context) -> tuple[bool, float, int]:
+        """Return whether the node is started again at its end, how much later, and how often at most."""
+        given, delay_s = self.more.get("respawn"), self.more.get("respawn_delay")
+        most = self.more.get("respawn_max_retries")
+        for name in _AT_END[1:]:
+            if isinstance(self.more.get(name), Lacking):
+                context.leave_out(self.file, self.line, LeftOutError("node_argument", name))
+                return False, 0.0, -1
+        again = given if isinstance(given, bool) else given is not None and truth_of(given, context)
+        if not again:
+            return False, 0.0, -1
+        if not isinstance(delay_s, (int, float, type(None))):
+            raise TypeError(f"respawn_delay: expected a number of seconds, found {type(delay_s).__name__}")
+        if not isinstance(most, (int, type(None))):
+            raise TypeError(f"respawn_max_retries: expected a whole number, found {type(most).__name__}")
+        return True, float(delay_s or 0.0), -1 if most is None else most
 
     def _parameters(self, entry: Any, target: str, context: Context, named: list[str]) -> list[list[str]]:
         """Return the name and text of the parameter file for an entry of `parameters`; `named` gets those by name."""
@@ -119,23 +146,35 @@ class LifecycleNode(Node):
         super().__init__(name=name, namespace=namespace, **more)
 
 
-class ExecuteProcess(Action):
+class ExecuteProcess(ProcessAction):
     """A command; only `ros2 run` is understood."""
 
-    def __init__(self, *, cmd: Any, condition: Any = None, **_: Any) -> None:
+    def __init__(self, *, cmd: Any, condition: Any = None, **more: Any) -> None:
         super().__init__(condition=condition)
         self.command = list(cmd)
+        self.at_end = {name: given for name, given in more.items() if name in _AT_END}
 
     def execute(self, context: Context) -> Iterable[Any]:
         """Describe the node of `ros2 run`, or leave the command out."""
+        if self.number is not None:
+            self.start_again(context)
+            return ()
         words = [text_of(part, context) for part in self.command]
         words = words[0].split() + words[1:] if words else []
         if words[:2] != ["ros2", "run"] or len(words) < 4:
             raise LeftOutError("command", " ".join(words[:3]), " ".join(words))
         split = words.index("--ros-args") if "--ros-args" in words else len(words)
-        node = Node(package=words[2], executable=words[3], arguments=words[4:split], ros_arguments=words[split + 1 :])
+        node = Node(
+            package=words[2],
+            executable=words[3],
+            arguments=words[4:split],
+            ros_arguments=words[split + 1 :],
+            **self.at_end,
+        )
         node.file, node.line = self.file, self.line
-        return [node]
+        walk([node], context)
+        self.number = node.number
+        return ()
 
 
 def _namespace(context: Context, own: str | None) -> str | None:

@@ -18,7 +18,7 @@ from grader.runtime.host.faults import Describer
 from grader.runtime.host.launch import ros_classes, ros_modules, ros_names
 from grader.runtime.host.launch.evaluation import describe
 from grader.runtime.host.launch.package_names import meant_by
-from grader.runtime.host.protocol import LaunchedNode, NotEvaluated
+from grader.runtime.host.protocol import LaunchedNode, LaunchHandler, LaunchReport, LaunchStep, NotEvaluated
 from grader.runtime.worker.notes import left_out_sentence, left_out_words
 
 IMPORTS = """
@@ -26,12 +26,14 @@ from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import *
 from launch.actions import (DeclareLaunchArgument, ExecuteProcess, GroupAction, IncludeLaunchDescription, LogInfo,
-    OpaqueFunction, SetEnvironmentVariable, SetLaunchConfiguration, TimerAction, RegisterEventHandler, EmitEvent)
+    OpaqueFunction, SetEnvironmentVariable, SetLaunchConfiguration, TimerAction, RegisterEventHandler, EmitEvent,
+    Shutdown)
 from launch.conditions import IfCondition, UnlessCondition, LaunchConfigurationEquals
-from launch.event_handlers import OnProcessExit
+from launch.event_handlers import OnExecutionComplete, OnProcessExit, OnProcessIO, OnProcessStart, OnShutdown
+from launch.event_handler import EventHandler
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import (Command, EnvironmentVariable, LaunchConfiguration, PathJoinSubstitution,
-    PythonExpression, TextSubstitution, ThisLaunchFileDir)
+    LocalSubstitution, PythonExpression, TextSubstitution, ThisLaunchFileDir)
 from launch_ros.actions import (ComposableNodeContainer, LifecycleNode, Node, PushRosNamespace, SetParameter, SetRemap)
 from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
 from launch_ros.substitutions import FindPackageShare
@@ -48,12 +50,12 @@ Described = tuple[list[LaunchedNode], list[NotEvaluated]]
 
 
 @pytest.fixture
-def described(tmp_path: Path) -> Callable[..., Described]:
+def reported(tmp_path: Path) -> Callable[..., LaunchReport]:
     """Evaluate a launch file with these actions."""
 
     def evaluate(
         actions: str, arguments: dict[str, str] | None = None, before: str = "", prefix: str = "", **others: str
-    ) -> Described:
+    ) -> LaunchReport:
         robot = tmp_path / "robot"
         (robot / "launch").mkdir(parents=True, exist_ok=True)
         (robot / "own.yaml").write_text("/**: {ros__parameters: {rate: 2.0}}\n")
@@ -65,6 +67,17 @@ def described(tmp_path: Path) -> Callable[..., Described]:
         with patch.dict(sys.modules), patch("os.system"), patch("sys.meta_path", [*sys.meta_path]):
             given = ((str(tmp_path),), str(file), {"robot": str(robot)}, arguments or {})
             return describe(*given, prefix=prefix, most_nodes=16, most_left_out=50)
+
+    return evaluate
+
+
+@pytest.fixture
+def described(reported: Callable[..., LaunchReport]) -> Callable[..., Described]:
+    """Evaluate a launch file with these actions; return its nodes, and what was left out."""
+
+    def evaluate(*given: Any, **others: str) -> Described:
+        found = reported(*given, **others)
+        return list(found.nodes), list(found.left_out)
 
     return evaluate
 
@@ -84,7 +97,7 @@ def test_a_node_has_everything_it_is_started_with(described: Callable[..., Descr
     rules = ["-r", "__node:=a", "-r", "__ns:=/b", "-r", "x:=/y"]
     assert node.ros_arguments == [*rules, "--log-level", "debug"]
     assert (node.package, node.executable, node.arguments) == ("robot", "talker", ["go"])
-    assert (node.file, node.delay_s) == ("robot/launch/a.launch.py", 0.0)
+    assert node.file == "robot/launch/a.launch.py"
     assert node.line == IMPORTS.count("\n") + 3
 
 
@@ -157,11 +170,11 @@ def test_conditions_choose(described: Callable[..., Described], arguments: dict[
     assert [rules[1] for rules in ros(nodes)] == [f"__node:={name}" for name in started]
 
 
-def test_included_files_get_arguments(described: Callable[..., Described]) -> None:
+def test_included_files_get_arguments(reported: Callable[..., LaunchReport]) -> None:
     """Beside the file, or found by the package; a function's actions and later ones are described too."""
     part = "def generate_launch_description():\n    return LaunchDescription([DeclareLaunchArgument('name'), "
     part += "Node(**TALKER, name=LaunchConfiguration('name'))])\n"
-    nodes, _ = described(
+    found = reported(
         "IncludeLaunchDescription(PythonLaunchDescriptionSource([ThisLaunchFileDir(), '/part.launch.py']), "
         "  launch_arguments={'name': 'one'}.items()), "
         "TimerAction(period=2.0, actions=[OpaqueFunction(function=lambda context: [Node(**TALKER, "
@@ -169,14 +182,25 @@ def test_included_files_get_arguments(described: Callable[..., Described]) -> No
         "ExecuteProcess(cmd=['ros2', 'run', 'robot', 'talker', 'hi', '--ros-args', '-r', 'a:=b'])",
         part=part,
     )
+    nodes = list(found.nodes)
     assert [rules[1] for rules in ros(nodes)] == ["__node:=one", "__node:=one_more", "a:=b"]
-    assert [node.delay_s for node in nodes] == [0.0, 2.0, 0.0]
+    assert found.steps == [LaunchStep("start", 0), LaunchStep("start", 1, 2.0), LaunchStep("start", 2)]
     assert nodes[2].arguments == ["hi"]
 
 
 LEFT_OUT = {
     "ExecuteProcess(cmd=['rm', '-rf', '/'])": 'the command "rm -rf /"',
-    "RegisterEventHandler(OnProcessExit(target_action=None, on_exit=[]))": "the action RegisterEventHandler",
+    "RegisterEventHandler(OnProcessExit(on_exit=lambda event, context: []))": "the event handler OnProcessExit",
+    "RegisterEventHandler(OnProcessExit(target_action=lambda action: True, on_exit=[]))": "the event handler "
+    "OnProcessExit",
+    "RegisterEventHandler(OnProcessIO(on_stdout=lambda event: None))": "the event handler OnProcessIO",
+    "RegisterEventHandler(OnExecutionComplete(on_completion=[]))": "the event handler OnExecutionComplete",
+    "RegisterEventHandler(OnProcessExit(target_action=LogInfo(msg='a'), on_exit=[]))": "the event handler "
+    "OnProcessExit",
+    "RegisterEventHandler(EventHandler(matcher=print))": "the action RegisterEventHandler",
+    "RegisterEventHandler(OnShutdown(on_shutdown=[OpaqueFunction(function=print)]))": "the action OpaqueFunction",
+    "Node(**TALKER, on_exit=lambda event, context: None)": "the event handler OnProcessExit",
+    "Node(**TALKER, respawn=NoCondition(predicate=len))": "respawn= of a node",
     "ComposableNodeContainer(name='c', namespace='', executable='e')": "the action ComposableNodeContainer",
     "Node(**TALKER, parameters=[{'urdf': Command(['xacro ', 'a.urdf'])}])": 'the substitution Command("xacro a.urdf")',
     "SetEnvironmentVariable('PATH', '/x')": "the environment variable PATH",
@@ -193,6 +217,83 @@ LEFT_OUT = {
     "LogInfo(msg=str(has_resource('packages', 'image_view')))": "what needs the package image_view",
     "LogInfo(msg=str(os.system('mkdir here')))": 'the command "mkdir here"',
 }
+
+
+START, STOP = LaunchStep("start", 1), LaunchStep("shutdown")
+REGISTER = LaunchStep("register", 0)
+#: By what is done with the node `a`, the number 0: its event handler, with what that does.
+HANDLED = {
+    "RegisterEventHandler(OnProcessStart(target_action=a, on_start=[Node(**TALKER)]))": ("start", 0, False, [START]),
+    "RegisterEventHandler(OnProcessExit(target_action=a, on_exit=Node(**TALKER)))": ("exit", 0, False, [START]),
+    "RegisterEventHandler(OnProcessExit(on_exit=[EmitEvent(event=launch.events.Shutdown(reason='x'))]))": (
+        *("exit", -1, False),
+        [STOP],
+    ),
+    "RegisterEventHandler(OnExecutionComplete(target_action=a, on_completion=[Shutdown()], handle_once=True))": (
+        *("complete", 0, True),
+        [STOP],
+    ),
+    "RegisterEventHandler(OnShutdown(on_shutdown=[LogInfo(msg=LocalSubstitution('event.reason'))]))": (
+        *("shutdown", -1, False),
+        [],
+    ),
+    "RegisterEventHandler(OnProcessExit(target_action=a, on_exit=[LogInfo(msg='over'), TimerAction(period=2.5, "
+    "actions=[ExecuteProcess(cmd=['ros2', 'run', 'robot', 'talker']), Shutdown()])]))": (
+        *("exit", 0, False),
+        [START._replace(delay_s=2.5), STOP._replace(delay_s=2.5)],
+    ),
+}
+
+
+@pytest.mark.parametrize(("action", "handler"), HANDLED.items(), ids=HANDLED)
+def test_event_handlers_are_described(
+    reported: Callable[..., LaunchReport], action: str, handler: tuple[Any, ...]
+) -> None:
+    """With what they do, wherever they are registered: before the node, or after it."""
+    for actions in (f"a, {action}", f"{action}, a"):
+        found = reported(actions, before="a = Node(**TALKER, name='a')\n")
+        assert found.left_out == []
+        assert [*found.handlers] == [LaunchHandler(*handler)]
+        assert sorted(found.steps) == [REGISTER, LaunchStep("start", 0)]
+
+
+def test_what_a_node_does_at_its_end_is_described(reported: Callable[..., LaunchReport]) -> None:
+    """Whether it is started again, how much later, how often; and what its own `on_exit` does."""
+    found = reported(
+        "DeclareLaunchArgument('again', default_value='true'), "
+        "Node(**TALKER, respawn=True, respawn_delay=2.0), Node(**TALKER, respawn=LaunchConfiguration('again'), "
+        "respawn_max_retries=3), Node(**TALKER, respawn_delay=1.0), Node(**TALKER, on_exit=Shutdown())"
+    )
+    assert found.left_out == []
+    assert [node[-3:] for node in found.nodes] == [(True, 2.0, -1), (True, 0.0, 3), (False, 0.0, -1), (False, 0.0, -1)]
+    assert [*found.handlers] == [LaunchHandler("exit", 3, False, [STOP])]
+    assert [*found.steps] == [*(LaunchStep("start", number) for number in range(4)), REGISTER]
+
+
+def test_handlers_are_described_as_of_when_they_are_called(reported: Callable[..., LaunchReport]) -> None:
+    """The group around one has ended by then, with its namespace; handlers and nodes in them know of each other."""
+    found = reported(
+        "GroupAction([PushRosNamespace('in'), a, RegisterEventHandler(OnProcessExit(target_action=a, on_exit=[b, "
+        "RegisterEventHandler(OnProcessExit(target_action=b, on_exit=[a]))]))])",
+        before="a, b = Node(**TALKER, name='a'), Node(**TALKER, name='b')\n",
+    )
+    assert ros(list(found.nodes)) == [["-r", "__node:=a", "-r", "__ns:=/in"], ["-r", "__node:=b"]]
+    first, second = found.handlers
+    assert [*first.steps] == [START, LaunchStep("register", 1)]
+    assert second == LaunchHandler("exit", 1, False, [LaunchStep("start", 0)])
+
+
+def test_what_launch_refuses_of_event_handlers(described: Callable[..., Described]) -> None:
+    """With the errors that launch raises."""
+    refused = {
+        "RegisterEventHandler(OnProcessExit(target_action='a', on_exit=[]))": TypeError,
+        "RegisterEventHandler(OnProcessExit(on_exit=['a']))": TypeError,
+        "EmitEvent(event='shutdown')": RuntimeError,
+        "*[Node(**TALKER)] * 2": RuntimeError,  # the same action twice
+    }
+    for actions, kind in refused.items():
+        with pytest.raises(kind):
+            described(actions)
 
 
 @pytest.mark.parametrize(("action", "what"), LEFT_OUT.items(), ids=LEFT_OUT)
@@ -601,7 +702,7 @@ def test_a_mistake_of_a_launch_file_is_its_own(
 
 
 @pytest.mark.parametrize("argument", ["parameters", "name", "remappings", "arguments"])
-@pytest.mark.parametrize("made", ["OnProcessExit(on_exit=5)", "xacro.load()"])
+@pytest.mark.parametrize("made", ["NoCondition(predicate=len)", "xacro.load()"])
 def test_a_node_with_an_argument_that_is_left_out_is_left_out(
     described: Callable[..., Described], argument: str, made: str
 ) -> None:

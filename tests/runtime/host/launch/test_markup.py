@@ -30,7 +30,8 @@ def described(tmp_path: Path) -> Evaluate:
             (folder / other).write_text(content)
         with patch.dict(sys.modules), patch("os.system"), patch("sys.meta_path", [*sys.meta_path]):
             given = ((str(tmp_path),), str(folder / name), {"robot": str(tmp_path / "robot")}, arguments or {})
-            return describe(*given, most_nodes=16, most_left_out=50)
+            found = describe(*given, most_nodes=16, most_left_out=50)
+            return list(found.nodes), list(found.left_out)
 
     return evaluate
 
@@ -195,7 +196,7 @@ def test_files_of_all_kinds_include_each_other(described: Evaluate) -> None:
 
 LEFT_OUT = {
     "a container": ("<node_container pkg='x' exec='y' name='z' namespace=''/>", ("action", "node_container")),
-    "respawn": ("<node pkg='robot' exec='a' respawn='true'/>", ("node_argument", "respawn")),
+    "a prefix": ("<node pkg='robot' exec='a' launch-prefix='gdb'/>", ("node_argument", "prefix")),
     "a command": ("<executable cmd='ls -l'/>", ("command", "ls -l")),
     "xacro": ("<node pkg='robot' exec='a' args='$(command xacro)'/>", ("substitution", "Command")),
 }
