@@ -11,7 +11,7 @@ import json
 import os
 import resource
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, BinaryIO
 
 from grader.runtime.shipped import PACKAGE
@@ -29,6 +29,7 @@ def run_contained(  # noqa: PLR0913  what to run, and how
     real_s: float = REAL_S,
     *,
     installed: bool = False,
+    files: Sequence[int] = (),
 ) -> int:
     """Run a module that confines itself, and return its exit code.
 
@@ -39,6 +40,7 @@ def run_contained(  # noqa: PLR0913  what to run, and how
         out: Its standard output, a file.
         real_s: Real time, in seconds, after which it is killed.
         installed: Whether it uses installed packages. Finding them takes as long as all else that it imports.
+        files: Descriptors of files that it reads besides; it has them under the same numbers.
 
     Raises:
         OSError: The process cannot be started.
@@ -59,6 +61,7 @@ def run_contained(  # noqa: PLR0913  what to run, and how
         cwd="/",
         timeout=real_s,
         check=False,
+        pass_fds=files,
     ).returncode
 
 

@@ -60,7 +60,7 @@ def _of_exercise(exercise: Exercise, tree: YamlTree) -> Iterator[Mistake]:
             text = f"the scenario {scenario.id} is recorded, but no criterion uses it"
             yield tree.at(("scenarios", index, "id")).mistake(text)
     yield from _misspelt(exercise, tree)
-    run = {process for scenario in exercise.scenarios for process in scenario.handed_in}
+    run = {process for scenario in exercise.scenarios for process in scenario.wanted}
     if any(scenario.test is not None for scenario in exercise.scenarios):
         run |= {*exercise.files}  # only a run shows what a test starts
     for index, name in enumerate(exercise.files):
@@ -76,7 +76,7 @@ def _of_criterion(criterion: Criterion, exercise: Exercise, path: TreePath, tree
     if kind not in CHECKS.values() and not manual_of(kind).summary:
         yield where.mistake(f"{criterion.id} is judged by {kind.__name__}, which has no docstring to explain it")
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
-    if criterion.check_name == TESTED:
+    if criterion.check_name == TESTED or scenario.handed_in is not None:
         return
     yield from _of_stretches(criterion, scenario, path, tree)
     yield from _of_inputs(criterion, exercise, path, tree)

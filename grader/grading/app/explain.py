@@ -166,6 +166,11 @@ def _situation(scenario: Scenario) -> str:
     if scenario.test is not None:
         test, programs = scenario.test, ", ".join(scenario.processes)
         return f"the test {test.name} of {test.file} runs what it needs of {programs}"
+    if scenario.handed_in is not None:
+        asked = scenario.handed_in
+        topics = listed(asked.topics, "and") if asked.topics else "all topics"
+        read = f"of which the first {duration(asked.duration_ns)} of {topics} are read"
+        return f"the student hands in a recording named {asked.bag}, {read}"
     span = scenario.span
     text = f"{' and '.join(scenario.processes)} observed for {time_phrase(span.duration_ns)}"
     if span.after_first_message_on:

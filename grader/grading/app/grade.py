@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 import grader
 from grader.grading.app.bags import read_given, read_recordings, recordings_digest, refuse_unplayed
-from grader.grading.app.interfaces import definitions, known_interfaces, provided_for
+from grader.grading.app.interfaces import bag_definitions, definitions, known_interfaces, provided_for
 from grader.grading.app.request import GradeRequest, reproduction
 from grader.grading.app.seeds import PRACTICE_NOTE
 from grader.grading.app.spot_checks import SpotChecks, check
@@ -130,7 +130,7 @@ class Preparation:
         around: What the runs have besides the submission's files.
         played: Digest of the recordings that are played; empty if there are none.
         provided: The interface packages that are not installed.
-        kept: The recordings that need not be made again.
+        kept: The recordings that need not be made: those of an earlier run, and those that were handed in.
         reaches: What the submission's files use that reaches into their process.
     """
 
@@ -149,8 +149,9 @@ class Preparation:
     @property
     def unrecorded(self) -> list[Exercise]:
         """The exercises of which no recordings were kept."""
-        done = {exercise for exercise, _ in self.kept}
-        return [exercise for exercise in self.exercises if exercise.id not in done]
+        bags = {(exercise.id, one.id) for exercise in self.exercises for one in exercise.scenarios if one.handed_in}
+        recorded = {exercise for exercise, scenario in self.kept if (exercise, scenario) not in bags}
+        return [exercise for exercise in self.exercises if exercise.id not in recorded]
 
     def noting(self, problems: Sequence[str]) -> Submission:
         """Return the submission with further notes."""
@@ -191,6 +192,29 @@ def _with_kept(ready: Preparation) -> Preparation:
         return ready
 
 
+def _with_handed_in(ready: Preparation) -> Preparation:
+    """Add the traces of the recordings that were handed in; one that cannot be read counts as missing."""
+    asked = [(e, s) for e in ready.exercises for s in e.scenarios if s.handed_in and (e.id, s.id) not in ready.kept]
+    if not asked:
+        return ready
+    # Seldom needed.
+    from grader.grading.submissions.bag_traces import UnreadableBag, bag_trace  # noqa: PLC0415
+
+    files, traces = dict(ready.submission.files), dict(ready.kept)
+    for exercise, scenario in asked:
+        for wanted in scenario.wanted:
+            found = files[wanted].found
+            if found is None:
+                continue
+            brought = bag_definitions(exercise, ready.request.interfaces)
+            read = bag_trace(ready.submission.root, found, scenario, brought)
+            if isinstance(read, UnreadableBag):
+                files[wanted] = replace(files[wanted], found=None, problem=read.problem, hint=read.hint)
+            else:
+                traces[exercise.id, scenario.id] = read
+    return replace(ready, kept=traces, submission=replace(ready.submission, files=files))
+
+
 def _with_shares(ready: Preparation) -> Preparation:
     """Add what the submission's packages share, such as launch files and parameter files."""
     if not ready.unrecorded:
@@ -212,6 +236,7 @@ CONTRIBUTORS: tuple[Callable[[Preparation], Preparation], ...] = (
     _with_recordings,
     _with_interfaces,
     _with_kept,
+    _with_handed_in,
     _with_shares,
     _with_reaches,
 )
@@ -330,7 +355,9 @@ def plan_jobs(exercises: Sequence[Exercise], submission: Submission, around: Sur
         )
         for exercise in exercises
         for scenario in exercise.scenarios
-        if scenario.test is None and all(submission.files[name].found for name in scenario.handed_in)
+        if scenario.test is None
+        and scenario.handed_in is None
+        and all(submission.files[name].found for name in scenario.wanted)
     }
 
 
@@ -360,7 +387,7 @@ def plan_tests(exercises: Sequence[Exercise], submission: Submission, around: Su
 
 def begun(exercises: Sequence[Exercise], submission: Submission) -> tuple[list[Exercise], Submission]:
     """Return the exercises that a submission has a file for, and the submission limited to their files."""
-    begun = [e for e in exercises if any(submission.files[name].found for name in e.files)]
+    begun = [e for e in exercises if any(submission.files[name].found for name in e.wanted)]
     if not begun:
         where = printable(submission.path, 500)
         files = listed(wanted_files(exercises))
@@ -395,8 +422,8 @@ def belonging(exercises: Sequence[Exercise], submission: Submission) -> list[Exe
 
 
 def wanted_files(exercises: Sequence[Exercise]) -> list[str]:
-    """Return the names of the files that exercises require, without repetitions."""
-    return list(dict.fromkeys(name for exercise in exercises for name in exercise.files))
+    """Return the names of the files that exercises require, and the patterns of recordings, without repetitions."""
+    return list(dict.fromkeys(name for exercise in exercises for name in exercise.wanted))
 
 
 def _staged(request: GradeRequest, exercises: Sequence[Exercise], root: Path) -> Submission:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.grading.model.exercise import Exercise
-from grader.runtime.interface_packages import FOREVER_S, Provided, built_from, provide, type_folders
+from grader.runtime.interface_packages import FOREVER_S, Provided, built_from, packages_in, provide, type_folders
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Definition, Submission
 from grader.runtime.model.trace import Delivery, Message, Trace
@@ -68,6 +68,17 @@ def types_in(scenarios: Iterable[Scenario]) -> bytes:
     from grader.grading.rubrics.simulations import offered_by  # noqa: PLC0415 - as above
 
     return repr(sorted({name for one in offered_by(simulated) for name in one.types})).encode()
+
+
+def bag_definitions(exercise: Exercise, course: tuple[Path, ...] = ()) -> dict[str, str]:
+    """Return the definitions of message types that a rubric or a course brings, for recordings that lack them."""
+    folders = (*rubric_folders([exercise]), *course)
+    known = known_interfaces(tuple(folders)) if folders else None
+    if known is None:
+        return {}
+    names = {package.name for package in packages_in(folders)}
+    own = (type_ for type_ in known.of_kind("msg") if type_.partition("/")[0] in names)
+    return {type_: found.text for type_ in own if (found := known.definition(type_)) is not None}
 
 
 def definitions(traces: Iterable[Trace], provided: Provided) -> dict[str, Definition]:

@@ -14,7 +14,7 @@ from grader.grading.model.measures import Measured
 from grader.grading.model.wording import first_few, moment, nearest, quote, span
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S, counted, seconds
-from grader.runtime.model.trace import Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace, UnmetPolicy
+from grader.runtime.model.trace import BagContents, Endpoint, Fault, FaultKind, Message, ServiceEnd, Trace, UnmetPolicy
 
 #: Evidence key for the fault that a finding rests on; judging an exercise counts each fault once.
 FAULT_KEY = "fault"
@@ -325,6 +325,8 @@ def _most_alike(name: str, same_type: Sequence[str], others: Sequence[str]) -> s
 def explain_no_message(trace: Trace, topic: str, type_: str | None = None) -> Finding:
     """Return no credit with the reason why there is no message that counts on `topic`, of `type_` if given."""
     messages = [m for m in trace.messages() if m.t_ns < trace.stop_ns and m.topic not in HIDDEN_TOPICS]
+    if trace.bag is not None:
+        return _other_type(messages, topic, type_) or _not_in_bag(trace.bag, topic, type_)
     return (
         _too_early(messages, topic, type_)
         or _other_type(messages, topic, type_)
@@ -333,6 +335,24 @@ def explain_no_message(trace: Trace, topic: str, type_: str | None = None) -> Fi
         or _silent_publisher(trace, topic, type_)
         or _nothing(trace, topic, "publisher")
     )
+
+
+def _not_in_bag(bag: BagContents, topic: str, type_: str | None) -> Finding:
+    """Return no credit for a topic of which a recording that was handed in has no message."""
+    held = {name: (kind, count) for name, kind, count in bag.topics if name not in HIDDEN_TOPICS}
+    where, evidence = f"{topic}: no message in {quote(bag.file)}", {"topic": topic, "seen": list(held)[:20]}
+    if topic in held:
+        hint = "record while the node that publishes on it runs"
+        return not_met(f"{where}, though it lists the topic", evidence, hint=hint, problem=ProblemKind.SILENT)
+    same = [name for name, (kind, count) in held.items() if kind == type_ and count]
+    other = _most_alike(topic, same, [name for name, (_, count) in held.items() if count])
+    seen = first_few([f"{name} [{kind}]" for name, (kind, _) in held.items()]) if held else "no topics"
+    reason = f"{where}, which holds {seen}"
+    hint = f"record it with `ros2 bag record {topic}`"
+    if other is not None:
+        hint = f"publish on {topic} instead of {quote(other)}, and record it"
+        return not_met(reason, evidence, hint=hint, problem=ProblemKind.OTHER_NAME)
+    return not_met(reason, evidence, hint=hint, problem=ProblemKind.ABSENT)
 
 
 def _too_early(messages: list[Message], topic: str, type_: str | None) -> Finding | None:

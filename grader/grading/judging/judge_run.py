@@ -40,6 +40,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import Scenario, is_launch_file
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, Submission, is_notebook
 from grader.runtime.model.trace import AssessedTrace, ClockKind, Fault, GraphSnapshot, StartWay, Trace, same_node_name
+from grader.runtime.model.wording import listed
 
 if TYPE_CHECKING:  # only who lost points needs diagnosis, whose modules take a twentieth of a short `grade`
     from grader.grading.judging.diagnosis.rules import Case, Clue, Rule
@@ -116,7 +117,7 @@ def judge_exercise(
     verdicts, facts = undiagnosed(exercise, traces, submission, sources)
     assessed = [(s.id, traces[s.id]) for s in exercise.scenarios if s.id in traces]
     recorded = [(id_, t.recorded) for id_, t in assessed]
-    reasons = [t.clock_reason for _, t in assessed if t.clock is ClockKind.WALL]
+    reasons = [t.clock_reason for _, t in assessed if t.clock is ClockKind.WALL and t.bag is None]
     mistakes: list[AuthorMistake] = []
     if sources is not None and any(v.outcome in (Outcome.NOT_MET, Outcome.PARTLY) for v in verdicts):
         from grader.grading.judging.diagnosis import cases_of, diagnose, rules_of  # noqa: PLC0415 - see above
@@ -130,7 +131,12 @@ def judge_exercise(
         clock_reason=next((r for r in reasons if r), ""),
         verdicts=verdicts,
         faults=_faults(recorded),
-        notes=(*variant_notes(exercise.variant), *_notes(recorded, submission, sources), *notes),
+        notes=(
+            *variant_notes(exercise.variant),
+            *notes_on_bags(exercise, dict(recorded)),
+            *_notes(recorded, submission, sources),
+            *notes,
+        ),
         graph=_graph(exercise, traces),
         starts=tuple(dict.fromkeys(start for _, t in recorded for start in t.starts)),
         unchecked=next((t.unchecked for _, t in assessed if t.unchecked), ""),
@@ -184,6 +190,20 @@ def _notes(
     from grader.grading.judging.diagnosis import placed  # noqa: PLC0415 - see above
 
     return placed(notes, submission, sources)
+
+
+def notes_on_bags(exercise: Exercise, traces: Mapping[str, Trace]) -> tuple[str, ...]:
+    """Return a note for each recording that was handed in, with the criteria that rest on it."""
+    found: dict[str, list[str]] = {}
+    for criterion in exercise.criteria:
+        trace = traces.get(criterion.scenario)
+        if trace is not None and trace.bag is not None:
+            found.setdefault(trace.bag.file, []).append(criterion.id)
+    return tuple(
+        f"{quote(file)}: recorded by the student, not observed: {listed(names, 'and')} "
+        f"{'rests' if len(names) == 1 else 'rest'} on it"
+        for file, names in found.items()
+    )
 
 
 def notes_on_unheard(trace: Trace) -> tuple[str, ...]:
@@ -263,7 +283,7 @@ def _faults(recorded: list[tuple[str, Trace]]) -> tuple[ReportedFault, ...]:
 
 def _graph(exercise: Exercise, traces: Mapping[str, Trace]) -> GraphSnapshot | None:
     """Return the graph with most edges, the last of equals, from the last scenario with all files."""
-    whole = [s for s in exercise.scenarios if _runs_all(s, exercise) and s.id in traces]
+    whole = [s for s in exercise.scenarios if _runs_all(s, exercise) and s.id in traces and traces[s.id].bag is None]
     graphs = traces[whole[-1].id].graphs() if whole else ()
     return max(reversed(graphs), key=_edge_count, default=None)
 
@@ -401,6 +421,7 @@ class VerdictBuilder:
         if "/" in unnamed:  # an executable
             hint = _how_to_install(unnamed, self.submission)
             evidence.pop("likely", None)
+        hint = looked_for.hint or hint
         reason = f"{unnamed}: {looked_for.problem or 'not in the submission'}"
         found = () if looked_for.problem else (*similar, *others)
         reason += f"; found {first_few(found, len(found))}{' instead' if similar else ''}" if found else ""

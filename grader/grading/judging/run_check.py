@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from grader.grading.judging.authored import finding_flaw, is_authored, mistake_in, mistake_of
 from grader.grading.judging.checks import CHECKS
-from grader.grading.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault
+from grader.grading.judging.findings import AT_ONCE_NS, fault_place, faulted, first_fault, not_met
 from grader.grading.judging.idle_machine import quicker
 from grader.grading.judging.installation import EXTRAS, INTERFACES, lacking_package, lacking_python, may_differ_by_numpy
 from grader.grading.judging.launched import excuses
@@ -97,7 +97,7 @@ def _run_once(  # noqa: PLR0911  one for each reason
     """Run a check on one recording."""
     scenario = next(s for s in exercise.scenarios if s.id == criterion.scenario)
     trace = traces.get(scenario.id)
-    wanted = scenario.handed_in if trace is None or trace.tested is None else trace.tested.missing
+    wanted = scenario.wanted if trace is None or trace.tested is None else trace.tested.missing
     missing = tuple(p for p in wanted if p in submission.files and submission.files[p].found is None)
     if missing:
         return Answer(missing=missing)
@@ -207,7 +207,7 @@ def _with_first_at_once(trace: Trace) -> Trace | None:
     On the wall clock, the host holds the first message of a publisher until the grader's subscription has been
     discovered; the second one is not late. So if the two are closer to each other than others are, the first is moved.
     """
-    if trace.clock is not ClockKind.WALL:
+    if trace.clock is not ClockKind.WALL or trace.bag is not None:
         return None
     moved: dict[int, int] = {}
     for topic in {message.topic for message in trace.messages()}:
@@ -229,12 +229,17 @@ def _placed(finding: Finding, submission: Submission) -> Finding:
     return finding if place is None or not found else replace(finding, location=replace(place, file=found))
 
 
-def _judged(criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str] | None) -> Answer:
+def _judged(  # noqa: PLR0911  one for each reason
+    criterion: Criterion, scenario: Scenario, trace: Trace, sources: Mapping[str, str] | None
+) -> Answer:
     name = check_name(criterion)
     authored = bool(criterion.check_name) and is_authored(criterion.check)
     try:
         finding = ask(criterion.check, trace, sources)
     except HarnessError as error:
+        if trace.bag is not None:  # what is missing in it, the student has not recorded
+            hint = "record it again so that this is part of it"
+            return Answer(finding=not_met(f"{quote(trace.bag.file)}: {error.message}", hint=hint))
         return Answer(problem=f"{name} cannot be judged: {error.message}")
     except KeyboardInterrupt:
         raise

@@ -441,6 +441,12 @@ class Exercise:
     # Scenario id -> ids of the scenarios that repeat it with other drawn values; only of those that are drawn again
     draws: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """The files that a submission must contain, and the patterns of the recordings."""
+        bags = (scenario.handed_in.bag for scenario in self.scenarios if scenario.handed_in is not None)
+        return (*self.files, *dict.fromkeys(bags))
+
     def recordings_of(self, criterion: Criterion) -> tuple[str, ...]:
         """Return the ids of the scenarios that a criterion is judged on: its own, and those that repeat it."""
         return (criterion.scenario, *self.draws.get(criterion.scenario, ()))

@@ -35,6 +35,8 @@ from grader.grading.rubrics.drawing import (
 )
 from grader.grading.rubrics.types import (
     ActionType,
+    BagBytes,
+    BagPattern,
     Choice,
     Duration,
     FieldFormulaText,
@@ -89,6 +91,8 @@ _BY_KIND: Mapping[str, object] = {
     "formula of fields": FieldFormulaText,
     "pattern": PatternText,
     "recording": RecordingPath,
+    "bag": BagPattern,
+    "size of a bag": BagBytes,
     "field name": FieldName,
     "time": SomeTime,
     "time above 0": SomeLongTime,

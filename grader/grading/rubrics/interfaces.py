@@ -265,7 +265,10 @@ class _Checked:
         self._interfaces = interfaces
         self._stimuli = tuple(_stimuli(rubric))
         self._simulated = tuple(_simulated(rubric))
-        self._checks = tuple(_checks(rubric))
+        #: A recording may bring the definitions of its types, so an unknown type in a check of one is no mistake.
+        self._checks = tuple(
+            (path, check) for path, check, of_bag in _checks(rubric) if not (of_bag and _is_unknown(check, interfaces))
+        )
         #: Type of each topic, service and action; a topic with numbers has the type that the student's node chooses.
         self._types: dict[str, set[str]] = {}
         self._free: set[str] = set()
@@ -275,6 +278,8 @@ class _Checked:
                 if "/action/" in named.type:  # its feedback is a topic, which checks may read like any other
                     feedback = f"{named.type}_FeedbackMessage"
                     self._types.setdefault(f"{on}/_action/feedback", set()).add(feedback)
+        untyped = {path for path, check, of_bag in _checks(rubric) if of_bag and _end_of(check) not in self._types}
+        self._checks = tuple((path, check) for path, check in self._checks if path not in untyped)
 
     def _of_stimuli(self) -> Iterator[tuple[_Named, str]]:
         for path, stimulus in self._stimuli:
@@ -405,13 +410,21 @@ def _simulated(rubric: RubricShape) -> Iterator[tuple[TreePath, Offered]]:
             yield path, offered(simulated)
 
 
-def _checks(rubric: RubricShape) -> Iterator[tuple[TreePath, Any]]:
+def _checks(rubric: RubricShape) -> Iterator[tuple[TreePath, Any, bool]]:
+    """Yield the place of each check, the check, and whether it judges a recording that students hand in."""
+    bags = {scenario.id for scenario in rubric.scenarios if scenario.handed_in is not None}
     for index, criterion in enumerate(rubric.criteria):
         name, parameters = criterion.check.chosen
         try:
-            yield ("criteria", index, "check", name), plain_value(parameters)
+            yield ("criteria", index, "check", name), plain_value(parameters), criterion.scenario in bags
         except ValueError:
             continue  # a mistake that is found where criteria are built
+
+
+def _is_unknown(check: object, interfaces: Interfaces) -> bool:
+    """Return whether a check names a type that is not installed."""
+    type_ = getattr(check, "type", None)
+    return isinstance(type_, str) and type_.count("/") == 2 and interfaces.fields(type_) is None
 
 
 def _end_of(part: object) -> str:

@@ -13,9 +13,11 @@ from typing import NoReturn, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from grader.grading.judging.checks import CHECKS
+from grader.grading.judging.authored import is_authored
+from grader.grading.judging.checks import CHECKS, NOT_IN_BAGS
+from grader.grading.judging.checks.topics import Transform
 from grader.grading.judging.tested import TESTED, TestPasses
-from grader.grading.model.exercise import Check, Criterion, Exercise, Variant
+from grader.grading.model.exercise import Check, Criterion, Exercise, Variant, roles_of, texts_under
 from grader.grading.model.rubric_files import rubric_file
 from grader.grading.rubrics.author_modules import OwnHints
 from grader.grading.rubrics.draws import Draw, First
@@ -74,6 +76,7 @@ from grader.runtime.model.limits import MAX_RUBRIC_BYTES, Limits
 from grader.runtime.model.quantities import duration
 from grader.runtime.model.scenario import (
     Connection,
+    HandedInBag,
     RubricTest,
     RunOptions,
     Scenario,
@@ -133,6 +136,9 @@ def _both(rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
 
 def _in_scenario(scenario: ScenarioShape, index: int, rubric: RubricShape, tree: YamlTree) -> Iterator[Mistake]:
     path: TreePath = ("scenarios", index)
+    if scenario.handed_in is not None:
+        yield from _beside_bag(scenario, path, tree)
+        return
     yield from _repeated(scenario.processes, (*path, "processes"), tree)
     programs = [name for name in (*rubric.files, *filter(is_launch_file, rubric.provided)) if not _is_yaml(name)]
     one_of = "one of `files`" if len(programs) == len(rubric.files) else "a program in `files` or `provided`"
@@ -157,6 +163,13 @@ def _in_scenario(scenario: ScenarioShape, index: int, rubric: RubricShape, tree:
         late_ns = max((longest(one.delay_ns) for one in connections if one.topic in published_by(stimulus)), default=0)
         yield from _cut_off(stimulus, observed, late_ns, (*path, "observe", "duration"), tree)
     yield from _in_connections(connections, scenario, observed, path, tree)
+
+
+def _beside_bag(scenario: ScenarioShape, path: TreePath, tree: YamlTree) -> Iterator[Mistake]:
+    """Yield the keys of a scenario that only a run has."""
+    for key in sorted(scenario.model_fields_set - {"id", "handed_in"}):
+        text = f"expected nothing but `handed_in` for a recording that students hand in, found `{key}`"
+        yield tree.at_key((*path, key)).mistake(text, "what programs do is judged in a scenario of its own")
 
 
 def _in_connections(
@@ -222,6 +235,12 @@ def _in_criterion(criterion: CriterionShape, index: int, rubric: RubricShape, tr
     yield from _unknown(criterion.scenario, scenarios, "the id of a scenario", tree.at((*path, "scenario")))
     yield from _needs(criterion, index, rubric, tree)
     name, parameters = criterion.check.chosen
+    if criterion.scenario in scenarios and scenarios[criterion.scenario].handed_in is not None:
+        if name in NOT_IN_BAGS:
+            text = f"expected a check of messages, found `{name}`: no recording holds {NOT_IN_BAGS[name]}"
+            where = tree.at_key((*path, "check", name))
+            yield where.mistake(text, "judge it in a scenario that runs the program")
+        return
     process = parameters.model_dump(by_alias=True).get("process")
     if isinstance(process, str) and criterion.scenario in scenarios:
         known = scenarios[criterion.scenario].processes
@@ -418,7 +437,7 @@ def _exercise(
         _refuse(path, mistakes)
     limits = plain_value(rubric.limits)
     rules = brought.hints + hints_of({criterion.check_name for criterion in criteria} - brought.own)
-    own = tuple(_scenario(path, shape, limits, brought.provided) for shape in rubric.scenarios)
+    own = tuple(_scenario(path, shape, limits, brought.provided, criteria) for shape in rubric.scenarios)
     again = list(_again(own, rubric))
     return Exercise(
         id=rubric.exercise.id,
@@ -614,7 +633,34 @@ def _again(scenarios: Iterable[Scenario], rubric: RubricShape) -> Iterator[tuple
             yield scenario.id, replace(scenario, id=f"{scenario.id}_draw_{draw}")
 
 
-def _scenario(path: Path, shape: ScenarioShape, limits: Limits, provided: Mapping[str, str]) -> Scenario:
+def _of_bag(shape: ScenarioShape, limits: Limits, criteria: Iterable[Criterion]) -> Scenario:
+    """Return a scenario of a recording that students hand in, with the topics that its checks name.
+
+    A check of the rubric's own may read any topic: then all are read, unless the rubric names some.
+    """
+    asked: HandedInBag = plain_value(shape.handed_in)
+    checks = [criterion.check for criterion in criteria if criterion.scenario == shape.id]
+    topics = asked.topics
+    if not topics and not any(map(is_authored, checks)):
+        topics = tuple(dict.fromkeys(topic for check in checks for topic in topics_named(check)))
+    given = (topic for check in checks for topic in texts_under(check, *roles_of(type(check)).given))
+    asked = replace(asked, topics=topics)
+    return Scenario(shape.id, (), Span(0), limits=limits, handed_in=asked, given=tuple(dict.fromkeys(given)))
+
+
+def topics_named(check: Check) -> Iterator[str]:
+    """Yield the topics that a built-in check reads."""
+    roles = roles_of(type(check))
+    yield from texts_under(check, *roles.topics, *roles.given, *roles.hears, *roles.speaks)
+    if isinstance(check, Transform):
+        yield from check.topics
+
+
+def _scenario(
+    path: Path, shape: ScenarioShape, limits: Limits, provided: Mapping[str, str], criteria: Iterable[Criterion]
+) -> Scenario:
+    if shape.handed_in is not None:
+        return _of_bag(shape, limits, criteria)
     run: tuple[tuple[str, RunOptions], ...] = tuple(
         (name, plain_value(shape.run[name])) for name in shape.processes if name in shape.run
     )

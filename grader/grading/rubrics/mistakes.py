@@ -82,6 +82,8 @@ def _follows_from_another(one: ErrorDetails, errors: Sequence[ErrorDetails]) -> 
 def _mistake(one: ErrorDetails, tree: YamlTree, model: type[BaseModel]) -> Mistake:
     path, where = nearest_position(tree.values, one["loc"])
     kind, name = one["type"], str(one["loc"][-1]) if one["loc"] else ""
+    if kind == "lacking":
+        kind, name = "missing", one["ctx"]["key"]
     if kind == "missing":
         return where.mistake(f"expected the key `{name}`{_inside(path)}, found none")
     if kind == "extra_forbidden":

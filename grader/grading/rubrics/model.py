@@ -7,7 +7,16 @@ from datetime import date
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, create_model, model_validator
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainValidator,
+    Tag,
+    WithJsonSchema,
+    create_model,
+    model_validator,
+)
 
 from grader.grading.model.exercise import DUE_DATE, OPEN, ORDER, PUBLISHED, Feedback, Shows
 from grader.grading.rubrics.check_parameters import choice_model, part_model, simulation_shape
@@ -37,12 +46,13 @@ from grader.grading.rubrics.types import (
     Text,
     Whole,
     YesNo,
+    lacking,
     must,
     wrong,
 )
 from grader.grading.rubrics.variants import VariantsField
 from grader.runtime.model.limits import Limits
-from grader.runtime.model.scenario import Connection, Span, Stimulus
+from grader.runtime.model.scenario import Connection, HandedInBag, Span, Stimulus
 from grader.runtime.model.wording import listed
 from grader.runtime.simulation import SIMULATIONS, WallMap
 from grader.runtime.stimuli import KINDS, ServiceCalls, Simulated
@@ -87,10 +97,12 @@ def _stimulus_model(simulations: Mapping[str, type[Shape]]) -> type[Choice]:
 if TYPE_CHECKING:  # created at run time; pydantic reads those below
     LimitsShape = Shape
     ConnectionShape = Shape
+    HandedInBagShape = Shape
     ObserveShape = Shape
     StimulusShape = Choice
 else:
     ConnectionShape = part_model(Connection, "ConnectionShape")
+    HandedInBagShape = part_model(HandedInBag, "HandedInBagShape")
     LimitsShape = part_model(Limits, "LimitsShape", _LIMITS)
     ObserveShape = part_model(Span, "ObserveShape")
     StimulusShape = _stimulus_model({})
@@ -185,9 +197,16 @@ Draws = Annotated[Whole, must(lambda count: 1 <= count <= _MOST_DRAWS, f"a whole
 class ScenarioShape(Shape):
     """One situation that is recorded once."""
 
+    model_config = ConfigDict(
+        json_schema_extra={"anyOf": [{"required": ["processes", "observe"]}, {"required": ["handed_in"]}]}
+    )
+
     id: Id
-    processes: tuple[ProgramName, ...] = Field(min_length=1)
-    observe: ObserveShape
+    processes: tuple[ProgramName, ...] = Field(default=(), min_length=1)
+    observe: ObserveShape | None = None
+    handed_in: HandedInBagShape | None = Field(
+        default=None, description="a recording that students hand in, in place of everything else"
+    )
     stimuli: tuple[StimulusShape, ...] = ()
     connections: tuple[ConnectionShape, ...] = Field(
         default=(), description="topics on which messages of stimuli are late or lost"
@@ -201,6 +220,13 @@ class ScenarioShape(Shape):
     shutdown: Annotated[
         LongDuration | None, Field(description="how long they may take to end after Ctrl-C, which comes at the end")
     ] = None
+
+    @model_validator(mode="after")
+    def _is_run_or_handed_in(self) -> Self:
+        for key in ("processes", "observe"):
+            if self.handed_in is None and key not in self.model_fields_set:
+                raise lacking(key)
+        return self
 
 
 class CriterionShape(Shape):
@@ -222,7 +248,7 @@ class RubricShape(Shape):
 
     format: Literal["grader/rubric/v1"] = Field(alias="schema")
     exercise: ExerciseShape
-    files: tuple[HandedIn, ...] = Field(min_length=1)
+    files: tuple[HandedIn, ...] = Field(default=(), min_length=1)
     provided: tuple[ProvidedFile, ...] = Field(
         default=(), description="launch files and parameter files of the rubric's own, beside it"
     )
@@ -247,6 +273,12 @@ class RubricShape(Shape):
     variants: VariantsField = Field(default_factory=dict)
     scenarios: tuple[ScenarioShape, ...] = Field(min_length=1)
     criteria: tuple[CriterionShape, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _asks_for_files(self) -> Self:
+        if not self.files and (self.pytest or any(scenario.handed_in is None for scenario in self.scenarios)):
+            raise lacking("files")
+        return self
 
 
 @lru_cache(maxsize=8)

@@ -25,13 +25,19 @@ from pydantic_core import PydanticCustomError
 from grader.grading.judging.series import FormulaError, curve
 from grader.grading.rubrics.units import QuantityError, missing_unit, parse_quantity, quantity_example, quantity_pattern
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.quantities import Unit
+from grader.runtime.model.limits import MAX_BAG_BYTES
+from grader.runtime.model.quantities import Unit, size
 from grader.runtime.model.wording import listed
 
 
 def wrong(expected: str, hint: str = "") -> PydanticCustomError:
     """Return an error that states what was expected at a place in a rubric."""
     return PydanticCustomError("rubric", "{expected}", {"expected": expected, "hint": hint})
+
+
+def lacking(key: str) -> PydanticCustomError:
+    """Return an error about a key that a mapping lacks."""
+    return PydanticCustomError("lacking", "{key}", {"key": key})
 
 
 def must(holds: Callable[[Any], bool], expected: str) -> AfterValidator:
@@ -210,6 +216,16 @@ InterfaceFolder = Annotated[str, MatchingText(BESIDE, "a folder beside the rubri
 RecordingPath = Annotated[
     str, MatchingText(f"(?:{BESIDE})?", "a recording beside the rubric such as bags/scan", "bags/scan")
 ]
+#: The name of a recording that students hand in. It ends as no program and no parameter file does, so that the names of
+#: wanted files tell which of them is one.
+BagPattern = Annotated[
+    str,
+    MatchingText(
+        r"(?!.*\.(?:py|ya?ml|xml)$)[^/\\\[\]\x00-\x1f]+",
+        "the name of a recording such as *.mcap or square, without folders; * stands for any characters",
+        "*.mcap",
+    ),
+]
 #: A map as ROS's map_server reads it, under the same rules.
 MAP_FILE = r"(?:[A-Za-z0-9_][A-Za-z0-9_.-]*/)*[A-Za-z0-9_][A-Za-z0-9_.-]*\.ya?ml"
 MAP_WORDS = "the YAML file of a map in the rubric's folder such as maps/room.yaml"
@@ -224,6 +240,9 @@ Share = Annotated[Real, must(lambda share: 0 <= share <= 1, "a share from 0 to 1
 Duration = Annotated[int, Quantity(Unit("s"))]
 LongDuration = Annotated[int, Quantity(Unit("s"), above_zero=True)]
 Frequency = Annotated[float, Quantity(Unit("Hz"))]
+BagBytes = Annotated[
+    int, Quantity(Unit("B"), above_zero=True), must(lambda b: b <= MAX_BAG_BYTES, f"at most {size(MAX_BAG_BYTES)}")
+]
 
 #: A longer pattern is not one that a reader of the rubric could follow.
 _LONGEST_PATTERN = 400

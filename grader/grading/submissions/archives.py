@@ -305,15 +305,15 @@ def collect_archive(data: bytes, *, where: str, limits: SubmissionLimits = USUAL
         SubmissionError: It cannot be read, exceeds a limit, or holds a link, a device, or a name that some system could
             not store or would store elsewhere.
     """
-    if len(data) > limits.archive_bytes:
-        raise SubmissionError(f"{where}: expected at most {limits.archive_bytes >> 20} MiB, found more", FEWER)
+    if len(data) > limits.packed_bytes:
+        raise SubmissionError(f"{where}: expected at most {limits.packed_bytes >> 20} MiB, found more", FEWER)
     try:
         left = LeftOut()
         members = _without_generated(_wanted(_members(data, limits)), left, limits)
         files = tuple(_contents(members, len(data), left, limits))
     except UnusableArchiveError as error:
         raise SubmissionError(f"{where}: {error.problem}", error.hint) from None
-    return Collected(files, left.notes())
+    return Collected(files, left.notes(), tuple(left.too_large))
 
 
 def _members(data: bytes, limits: SubmissionLimits) -> list[Member]:
@@ -321,10 +321,13 @@ def _members(data: bytes, limits: SubmissionLimits) -> list[Member]:
     if kind is None:
         raise UnusableArchiveError("expected a zip or tar archive, found another kind of file", HAND_IN_ZIP)
     allowed = _allowed(len(data))
-    limit = _RATIO if allowed < MAX_UNPACKED_BYTES else f"{MAX_UNPACKED_BYTES >> 20} MiB unpacked"
-    total = min(MAX_UNPACKED_BYTES, allowed)
+    most = MAX_UNPACKED_BYTES + limits.bag_bytes
+    limit = _RATIO if allowed < most else f"{most >> 20} MiB unpacked"
+    total = min(most, allowed)
     if kind in KINDS and has_libarchive():
-        return foreign_members(data, kind, UnpackerLimits(limits.entries, limits.file_bytes, total, limit))
+        return foreign_members(
+            data, kind, UnpackerLimits(limits.entries, max(limits.file_bytes, limits.bag_bytes), total, limit)
+        )
     if kind not in _READABLE:
         hint = (
             f"{HAND_IN_ZIP}; the grader can read {kind} with the extra rclpy-grader[archives] and libarchive"
@@ -403,17 +406,18 @@ def _contents(
     members: Sequence[tuple[str, Member]], packed: int, left: LeftOut, limits: SubmissionLimits
 ) -> Iterator[tuple[str, bytes]]:
     """Unpack the members, counting actual sizes, not declared ones."""
-    total, most = 0, limits.file_bytes
+    total = 0
     for name, member in members:
+        most = limits.most_of(name)
         content = member.read(most + 1) if member.size <= most else None
         if content is None or len(content) > most:
-            left.add(f"larger than {most >> 20} MiB", name)
+            left.add_large(name, most)
             continue
         if len(content) != member.size:  # another program would unpack a different file
             raise UnusableArchiveError("expected a whole archive, found a damaged or incomplete one")
         total += len(content)
-        if total > limits.total_bytes:
-            raise UnusableArchiveError(f"expected at most {limits.total_bytes >> 20} MiB in all, found more", FEWER)
+        if total > limits.whole_bytes:
+            raise UnusableArchiveError(f"expected at most {limits.whole_bytes >> 20} MiB in all, found more", FEWER)
         if total > _allowed(packed):
             raise UnusableArchiveError(f"expected at most {_RATIO}, found more", FEWER)
         yield name, content

@@ -6,11 +6,12 @@ import os
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import field
+from dataclasses import field, replace
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import (
     MAX_ARCHIVE_BYTES,
+    MAX_BAG_BYTES,
     MAX_DEPTH,
     MAX_ENTRIES,
     MAX_FILE_BYTES,
@@ -19,6 +20,7 @@ from grader.runtime.model.limits import (
     MAX_PATH_BYTES,
     MAX_TOTAL_BYTES,
 )
+from grader.runtime.model.scenario import is_bag_file, is_bag_pattern
 from grader.runtime.model.wording import first_of, printable
 
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
@@ -59,10 +61,32 @@ class SubmissionLimits:
     file_bytes: int = MAX_FILE_BYTES  # a larger file is left out with a note
     total_bytes: int = MAX_TOTAL_BYTES
     archive_bytes: int = MAX_ARCHIVE_BYTES
+    bag_bytes: int = 0  # how much of recordings is read, besides all other files; 0 if nobody asks for any
+
+    def most_of(self, name: str) -> int:
+        """Return the most bytes of a file; a larger one is left out with a note."""
+        return max(self.file_bytes, self.bag_bytes) if is_bag_file(name) else self.file_bytes
+
+    @property
+    def whole_bytes(self) -> int:
+        """The most bytes of all files together."""
+        return self.total_bytes + self.bag_bytes
+
+    @property
+    def packed_bytes(self) -> int:
+        """The most bytes of an archive."""
+        return self.archive_bytes + self.bag_bytes
 
 
 #: The limits of every submission.
 USUAL = SubmissionLimits()
+#: Those of a submission that may have recordings.
+_WITH_BAGS = replace(USUAL, bag_bytes=MAX_BAG_BYTES)
+
+
+def limits_for(wanted: Iterable[str]) -> SubmissionLimits:
+    """Return the limits of a submission that is to have these files."""
+    return _WITH_BAGS if any(map(is_bag_pattern, wanted)) else USUAL
 
 
 def is_skipped_folder(name: str) -> bool:
@@ -154,6 +178,7 @@ class Collected:
     # Relative POSIX path and content; every path stays inside, and paths are unique
     files: tuple[tuple[str, bytes], ...]
     notes: tuple[str, ...] = ()  # sentences about skipped files
+    too_large: tuple[str, ...] = ()  # the paths of recordings that were skipped for their size
 
 
 def largest_of(files: Iterable[tuple[str, bytes]]) -> str:
@@ -167,10 +192,17 @@ class LeftOut:
     """Names of skipped files and folders, by reason."""
 
     by_reason: dict[str, dict[str, None]] = field(default_factory=dict)
+    too_large: dict[str, None] = field(default_factory=dict)  # recordings
 
     def add(self, reason: str, relative: str) -> None:
         """Record a skipped path once."""
         self.by_reason.setdefault(reason, {})[relative] = None
+
+    def add_large(self, relative: str, most: int) -> None:
+        """Record a file that was skipped because it has more than `most` bytes."""
+        self.add(f"larger than {most >> 20} MiB", relative)
+        if is_bag_file(relative):
+            self.too_large[relative] = None
 
     def notes(self) -> tuple[str, ...]:
         """Return one sentence per reason, in an order that does not depend on the file system."""

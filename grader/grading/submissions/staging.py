@@ -43,15 +43,15 @@ def collect_folder(folder: Path, *, into: Path, where: str, limits: SubmissionLi
         files = []
         total = 0
         for relative in sorted(walk.files(top), key=os.fsencode):
-            content = _content(top, relative, left, limits.file_bytes)
+            content = _content(top, relative, left, limits.most_of(relative))
             if content is not None:
                 total += len(content)
                 files.append((relative, content))
-                if total > limits.total_bytes:
-                    raise _too_much(where, f"{limits.total_bytes >> 20} MiB in all", largest_of(files))
+                if total > limits.whole_bytes:
+                    raise _too_much(where, f"{limits.whole_bytes >> 20} MiB in all", largest_of(files))
     finally:
         os.close(top)
-    return Collected(tuple(files), left.notes())
+    return Collected(tuple(files), left.notes(), tuple(left.too_large))
 
 
 def read_start(file: Path, most: int, *, where: str) -> bytes:
@@ -175,7 +175,7 @@ def _content(top: int, relative: str, left: LeftOut, most: int) -> bytes | None:
         left.add(reason, relative)
         return None
     if content is None or len(content) > most:
-        left.add(f"larger than {most >> 20} MiB", relative)
+        left.add_large(relative, most)
         return None
     return content
 

@@ -11,13 +11,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
-from grader.grading.submissions.collected import Collected
+from grader.grading.submissions.bag_files import find_bag
+from grader.grading.submissions.collected import Collected, limits_for
 from grader.grading.submissions.contents import SubmissionContents, read_contents
 from grader.grading.submissions.projects import read_projects
 from grader.grading.submissions.staging import collect_folder, read_start, write_files
 from grader.runtime.model.errors import SubmissionError
-from grader.runtime.model.limits import MAX_ARCHIVE_BYTES, MAX_FILE_BYTES
+from grader.runtime.model.limits import MAX_FILE_BYTES
 from grader.runtime.model.projects import ExaminedPackage, Project
+from grader.runtime.model.scenario import is_bag_file, is_bag_pattern
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.runtime.model.wording import first_of, listed, printable
 from grader.runtime.programs.executables import Executable, executables, find_executables
@@ -61,14 +63,16 @@ def stage_submission(
 
     Args:
         path: A folder, an archive or one .py file, as the user typed it. If a folder or archive holds no .py file but
-            one archive, that archive is used: learning platforms deliver uploads this way.
-        wanted: File names of all exercises being graded; a missing one has the names that look like it.
+            one archive, that archive is used: learning platforms deliver uploads this way. Where a recording is
+            wanted, it may also be one.
+        wanted: File names of all exercises being graded, and patterns of recordings; a missing file has the names that
+            look like it.
         into: Empty folder that receives the copy.
         meant: Wanted file name -> the path inside the submission that is meant, where several files may have the name.
 
     Raises:
-        SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file, a limit
-            is exceeded, or an archive cannot be used.
+        SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file although
+            only programs are wanted, a limit is exceeded, or an archive cannot be used.
         HarnessError: The copy cannot be written, or no process can be started that reads project files.
     """
     return stage_collected(collect_submission(path, wanted, into), path, wanted, into, meant)
@@ -79,7 +83,7 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
     where = printable(path, 500)
     source = Path(path)
     if stat.S_ISDIR(_mode(path, where)):
-        return _with_python(collect_folder(source, into=into, where=where), wanted, where)
+        return _with_work(collect_folder(source, into=into, where=where, limits=limits_for(wanted)), wanted, where)
     return _collect_file(source, wanted, where)
 
 
@@ -114,6 +118,8 @@ def stage_collected(
     files = {
         name: _look_for_executable(name, into, projects, programs, collected.files, wanted)
         if "/" in name and name not in meant
+        else find_bag(name, [file for file, _ in collected.files], collected.too_large)
+        if is_bag_pattern(name)
         else _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
         for name in wanted
     }
@@ -164,11 +170,11 @@ def not_there(path: str, hint: str = "") -> SubmissionError:
 
 
 def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
-    return _with_python(_every_file_of(source, wanted, where), wanted, where)
+    return _with_work(_every_file_of(source, wanted, where), wanted, where)
 
 
 def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected:
-    """Return a .py file, or the files of an archive."""
+    """Return a .py file, a recording where one is wanted, or the files of an archive."""
     if not source.is_file():
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
     # Most submissions are folders.
@@ -179,7 +185,12 @@ def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected
         collect_archive,
     )
 
-    content = read_start(source, MAX_ARCHIVE_BYTES + 1, where=where)
+    limits = limits_for(wanted)
+    content = read_start(source, limits.packed_bytes + 1, where=where)
+    if limits.bag_bytes and is_bag_file(source.name):
+        if len(content) > limits.bag_bytes:
+            raise SubmissionError(f"{where}: expected at most {limits.bag_bytes >> 20} MiB, found more")
+        return Collected(((source.name, content),))
     kind = archive_kind(content[:HEAD_BYTES])
     # A program may look like an old tar archive, by chance or on purpose.
     if source.suffix.casefold() == ".py" and kind in (None, "tar"):
@@ -188,7 +199,7 @@ def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected
         return Collected(((source.name, content),))
     if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file", _other_kind(source, wanted))
-    return collect_archive(content, where=where)
+    return collect_archive(content, where=where, limits=limits)
 
 
 def _archives(collected: Collected) -> list[tuple[str, bytes]]:
@@ -206,22 +217,28 @@ def _other_kind(source: Path, wanted: Sequence[str]) -> str:
     return ""
 
 
-def _with_python(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
-    """Return the files if there are .py files among them, or else those of the only archive in them."""
-    names = [name for name, _ in collected.files]
-    if _has_python(names):
+def _with_work(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
+    """Return the files if there are .py files or wanted recordings among them, or else those of the only archive.
+
+    Where a recording is wanted, a submission without any is graded: its criteria say what is missing.
+    """
+    names, bags = [name for name, _ in collected.files], any(map(is_bag_pattern, wanted))
+    if _has_python(names) or (bags and any(map(is_bag_file, names))):
         return collected
     from grader.grading.submissions.archives import collect_archive  # noqa: PLC0415 - as above
 
     archives = _archives(collected)
+    if bags and len(archives) != 1:
+        return collected
     if len(archives) != 1:
         raise _no_python(collected, wanted, where)
     name, packed = archives[0]
     inside = f"{where.rstrip('/')}/{printable(name)}"
-    inner = collect_archive(packed, where=inside)
-    if not _has_python(name for name, _ in inner.files):
+    inner = collect_archive(packed, where=inside, limits=limits_for(wanted))
+    if not bags and not _has_python(name for name, _ in inner.files):
         raise _no_python(inner, wanted, inside)
-    return Collected(inner.files, (f"the contents of {printable(name)} were graded", *collected.notes, *inner.notes))
+    notes = (f"the contents of {printable(name)} were graded", *collected.notes, *inner.notes)
+    return Collected(inner.files, notes, inner.too_large)
 
 
 def _has_python(names: Iterable[str]) -> bool:

@@ -23,6 +23,9 @@ MAX_FILES = 2_000
 MAX_TOTAL_BYTES = 50 << 20
 #: The most bytes of one of them.
 MAX_FILE_BYTES = 8 << 20
+#: The most bytes of the recordings that students hand in for one submission, where a rubric asks for one: what
+#: `size` may be at most. They are read into memory while a submission is copied.
+MAX_BAG_BYTES = 512 << 20
 #: The most folders in each other.
 MAX_DEPTH = 20
 #: Entries of any kind that are examined before a folder or an archive is rejected as not being a submission. They are

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import Limits
-from grader.runtime.model.quantities import NS_PER_S, Kind, Topic
+from grader.runtime.model.quantities import MIB, NS_PER_S, Bytes, Kind, Topic
 from grader.runtime.model.worlds import WallMap
 
 
@@ -269,6 +269,18 @@ class Connection:
 
 
 @dataclass(frozen=True, slots=True)
+class HandedInBag:
+    """A recording that the student hands in: its messages are judged in place of those of a run."""
+
+    # The name of its file or folder, where `*` stands for any characters
+    bag: Annotated[str, Kind("bag")]
+    # The topics that are read; without any, those that the checks name
+    topics: tuple[Topic, ...] = ()
+    size_bytes: Annotated[Bytes, Kind("size of a bag"), "the largest recording that is read"] = 256 * MIB
+    duration_ns: Annotated[FixedTime, "how much of it is read, from the first message on"] = 600 * NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """One situation that is recorded once."""
 
@@ -286,15 +298,20 @@ class Scenario:
     provided: tuple[tuple[str, str], ...] = ()  # name and text of the rubric's own files that this scenario uses
     test: RubricTest | None = None  # the test that runs the programs it needs; None if all are run as planned
     connections: tuple[Connection, ...] = ()  # topics on which messages of stimuli are late or lost, each once
+    handed_in: HandedInBag | None = None  # the recording that takes the place of a run; None if programs run
+    # Of that recording, the topics that checks take for what the grader publishes in a run
+    given: tuple[str, ...] = ()
 
     @property
-    def handed_in(self) -> tuple[str, ...]:
-        """The files that a student has to hand in for this scenario: programs, then parameter files.
+    def wanted(self) -> tuple[str, ...]:
+        """The files that a student has to hand in for this scenario: programs, then parameter files, or a recording.
 
         None for a test: only its run shows which programs it needs.
         """
         if self.test is not None:
             return ()
+        if self.handed_in is not None:
+            return (self.handed_in.bag,)
         used = (*self.processes, *(options.parameters_file for _, options in self.run if options.parameters_file))
         own = dict(self.provided)
         return tuple(dict.fromkeys(name for name in used if name not in own))
@@ -307,3 +324,17 @@ LAUNCH_ENDINGS = ("launch.py", "launch.xml", "launch.yaml", "launch.yml")
 def is_launch_file(name: str) -> bool:
     """Return whether a file is a launch file, by its name, as `ros2 launch` lists them."""
     return name.endswith(LAUNCH_ENDINGS)
+
+
+#: How the names of the files of rosbag2 recordings end, and what follows if they are compressed as a whole.
+BAG_ENDINGS, BAG_COMPRESSED = (".mcap", ".db3"), ".zstd"
+
+
+def is_bag_file(name: str) -> bool:
+    """Return whether a file is one of a recording, by its name."""
+    return name.casefold().removesuffix(BAG_COMPRESSED).endswith(BAG_ENDINGS)
+
+
+def is_bag_pattern(wanted: str) -> bool:
+    """Return whether the name of a wanted file is the pattern of a recording: no program has such a name."""
+    return "/" not in wanted and not wanted.endswith((".py", ".yaml", ".yml", ".xml"))

@@ -85,6 +85,7 @@ class StudentFile:
     likely: bool = False  # whether the first candidate resembles it, by its name or its text
     executable: str = ""  # name of the entry point that runs the file, if it was found by one
     problem: str = ""  # why there is none, if more is known than that
+    hint: str = ""  # what to do about that problem, if more is known than that
 
 
 @dataclass(frozen=True, slots=True)

@@ -402,6 +402,18 @@ class Tested:
 
 
 @dataclass(frozen=True, slots=True)
+class BagContents:
+    """What a recording holds that a student has handed in."""
+
+    file: str  # its file or folder, relative to the submission
+    # Every topic of the recording, read or not, with its type and how many messages there are
+    topics: tuple[tuple[str, str, int], ...] = ()
+    # Of each topic that was read: its name, how many different messages it has, and a digest of all of them in their
+    # order, without the times at which they were recorded and stamped
+    contents: tuple[tuple[str, int, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Trace:
     """What was recorded of one scenario: all that checks, hint rules and charts read."""
 
@@ -423,6 +435,8 @@ class Trace:
     drawn: tuple[Sketch, ...] = ()  # the pictures of the simulations that took part, as they were at the end
     # What the test has found whose run this is; None for a scenario that checks judge
     tested: Tested | None = None
+    # The recording that the student has handed in and that was read for this trace; None if programs ran
+    bag: BagContents | None = None
     _known: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: Hashable, work: Callable[[], Known]) -> Known:

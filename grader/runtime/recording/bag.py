@@ -1,4 +1,4 @@
-"""Reads the messages of one topic from a rosbag2 recording."""
+"""Reads rosbag2 recordings: the messages of one topic, and what every reader of a recording needs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -31,12 +32,15 @@ _CDR_LITTLE_ENDIAN = b"\x00\x01"
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _ROS_1_MAGIC = b"#ROSBAG V"
 _SQLITE_MAGIC = b"SQLite format 3\x00"
-_SQLITE_HEAD = 18  # the magic, then the page size in two bytes, where 1 means 65536
+#: How many bytes at the beginning of a file tell what it is: the magic of SQLite, then its page size in two bytes,
+#: where 1 means 65536.
+HEAD_BYTES = 18
 #: Characters with a meaning in an SQLite URI. rosbags puts the path into one without escaping it.
 _ADDRESS_CHARACTERS = frozenset("?#%")
 
-_HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record` writes it"
-_HINT_DAMAGED = "copy or record it again; a recorder that was killed leaves a file that `ros2 bag reindex` may fix"
+HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record` writes it"
+HINT_ROS_1 = "convert it with `rosbags-convert --src FILE.bag --dst FOLDER`"
+HINT_DAMAGED = "copy or record it again; a recorder that was killed leaves a file that `ros2 bag reindex` may fix"
 
 _Raw = tuple[int, bytes]
 _T = TypeVar("_T")
@@ -84,7 +88,7 @@ def topics_in(path: Path) -> Mapping[str, str]:
     """Return the topics of a recording with their types; raises RecordingError if it cannot be read."""
     source = _source(path)
     with _plainly_named(source) as plain:
-        return {topic: type_ for topic, type_, _ in _opened(path, plain, _topics)}
+        return {topic: type_ for topic, type_, _ in opened_bag(path, plain, _topics)}
 
 
 def _source(path: Path) -> Path:
@@ -93,16 +97,16 @@ def _source(path: Path) -> Path:
         return _source_in(path) if stat.S_ISDIR(path.stat().st_mode) else _source_file(path)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise RecordingError(
-            f"{_line(path)}: expected a recording, found no such file or folder", _HINT_SOURCE
+            f"{one_line(path)}: expected a recording, found no such file or folder", HINT_SOURCE
         ) from error
     except PermissionError as error:
         denied = Path(error.filename or path)
         raise RecordingError(
-            f"{_line(path)}: expected a recording that may be read, found no permission for {_line(denied.name)}",
+            f"{one_line(path)}: expected a recording that may be read, found no permission for {one_line(denied.name)}",
             "let the user who grades read the folder and its files",
         ) from error
     except (OSError, ValueError) as error:
-        raise RecordingError(f"{_line(path)}: cannot be opened ({_line(error)})", _HINT_SOURCE) from error
+        raise RecordingError(f"{one_line(path)}: cannot be opened ({one_line(error)})", HINT_SOURCE) from error
 
 
 def _source_in(folder: Path) -> Path:
@@ -117,30 +121,41 @@ def _source_in(folder: Path) -> Path:
     if len(bare) == 1:
         return _source_file(bare[0])
     if bare:
-        names = ", ".join(_line(b.name) for b in bare)
+        names = ", ".join(one_line(b.name) for b in bare)
         raise RecordingError(
-            f"{_line(folder)}: expected metadata.yaml or a single recording, found {names}", "name one of these files"
+            f"{one_line(folder)}: expected metadata.yaml or a single recording, found {names}",
+            "name one of these files",
         )
     if any(e.suffix == ".bag" for e in entries):
         raise _ros_1(folder)
     found = "compressed files without their metadata.yaml" if storages else "no .mcap or .db3 file"
-    raise RecordingError(f"{_line(folder)}: expected a rosbag2 recording, found {found}", _HINT_SOURCE)
+    raise RecordingError(f"{one_line(folder)}: expected a rosbag2 recording, found {found}", HINT_SOURCE)
 
 
 def _source_file(path: Path) -> Path:
     if not path.is_file():
-        raise RecordingError(f"{_line(path)}: expected a recording, found neither a file nor a folder", _HINT_SOURCE)
+        raise RecordingError(f"{one_line(path)}: expected a recording, found neither a file nor a folder", HINT_SOURCE)
     head = _probe(path)
-    if path.suffix == ".bag" or head.startswith(_ROS_1_MAGIC):
-        raise _ros_1(path)
+    refuse_ros_1(path, head)
     if path.name == "metadata.yaml":
         return _source_in(path.parent)
     if path.suffix not in _STORAGE:
-        found = f"the ending {_line(path.suffix)}" if path.suffix else "no ending"
-        raise RecordingError(f"{_line(path)}: expected a .mcap or .db3 file, found {found}", _HINT_SOURCE)
-    if not head:
-        raise RecordingError(f"{_line(path)}: expected a recording, found an empty file", _HINT_DAMAGED)
+        found = f"the ending {one_line(path.suffix)}" if path.suffix else "no ending"
+        raise RecordingError(f"{one_line(path)}: expected a .mcap or .db3 file, found {found}", HINT_SOURCE)
+    refuse_empty(path, head)
     return path
+
+
+def refuse_ros_1(path: Path, head: bytes) -> None:
+    """Raise RecordingError for a recording of ROS 1, by its name and its first bytes."""
+    if path.suffix == ".bag" or head.startswith(_ROS_1_MAGIC):
+        raise _ros_1(path)
+
+
+def refuse_empty(path: Path, head: bytes) -> None:
+    """Raise RecordingError for an empty file, by its first bytes."""
+    if not head:
+        raise RecordingError(f"{one_line(path)}: expected a recording, found an empty file", HINT_DAMAGED)
 
 
 def _probe(path: Path) -> bytes:
@@ -151,15 +166,20 @@ def _probe(path: Path) -> bytes:
         RecordingError: The last page of an SQLite file is cut off; SQLite itself would read zeros there.
     """
     with path.open("rb") as file:
-        head = file.read(_SQLITE_HEAD)
+        head = file.read(HEAD_BYTES)
         size = file.seek(0, os.SEEK_END)
+    refuse_cut(path, head, size)
+    return head
+
+
+def refuse_cut(path: Path, head: bytes, size: int) -> None:
+    """Raise RecordingError for an SQLite file whose last page is cut off, by its first bytes and its size."""
     page_size = int.from_bytes(head[16:18], "big") if head.startswith(_SQLITE_MAGIC) else 0
     if size % max(1, page_size):
         raise RecordingError(
-            f"{_line(path)}: expected a complete rosbag2 recording, found a damaged one (cut after {size} bytes)",
-            _HINT_DAMAGED,
+            f"{one_line(path)}: expected a complete rosbag2 recording, found a damaged one (cut after {size} bytes)",
+            HINT_DAMAGED,
         )
-    return head
 
 
 @contextmanager
@@ -174,17 +194,25 @@ def _plainly_named(source: Path) -> Iterator[Path]:
         yield link
 
 
-def _opened(path: Path, source: Path, read: Callable[[Any], _T]) -> _T:
-    """Return what a function reads with the reader of rosbags; raises RecordingError if it fails."""
+def opened_bag(path: Path, source: Any, read: Callable[[Any], _T]) -> _T:
+    """Return what a function reads with the reader of rosbags; raises RecordingError if it fails.
+
+    Args:
+        path: The recording, as messages name it.
+        source: What rosbags opens: a path, or what it uses like one.
+        read: Reads; a RecordingError of its own is passed on.
+    """
     from rosbags.rosbag2 import Reader  # takes 60 ms, which runs without a recording save  # noqa: PLC0415
 
     try:
         with Reader(source) as reader:
             return read(reader)
+    except RecordingError:
+        raise
     except Exception as error:  # damaged bytes make the parsers of rosbags raise nearly anything
-        problem = _line(error, source=source)
+        problem = one_line(error, source=source)
         raise RecordingError(
-            f"{_line(path)}: expected a complete rosbag2 recording, found a damaged one ({problem})", _HINT_DAMAGED
+            f"{one_line(path)}: expected a complete rosbag2 recording, found a damaged one ({problem})", HINT_DAMAGED
         ) from error
 
 
@@ -202,11 +230,14 @@ def _read(path: Path, source: Path, topic: str, type_: str) -> tuple[str, list[_
         raw = [(t_ns, bytes(data)) for _, t_ns, data in reader.messages(connections)] if connections else []
         return topics, chosen, raw
 
-    topics, chosen, raw = _opened(path, source, read)
+    topics, chosen, raw = opened_bag(path, source, read)
     if chosen is None:
-        types = ", ".join(sorted({f"{_line(kind)} on {_line(name)}" for name, kind, _ in topics})) or "no topics at all"
+        types = (
+            ", ".join(sorted({f"{one_line(kind)} on {one_line(name)}" for name, kind, _ in topics}))
+            or "no topics at all"
+        )
         raise RecordingError(
-            f"{_line(path)}: expected a topic of type {type_}, found {types}",
+            f"{one_line(path)}: expected a topic of type {type_}, found {types}",
             f"record it with `ros2 bag record {topic}`",
         )
     return chosen, raw
@@ -228,23 +259,23 @@ def _decoded(path: Path, topic: str, type_: str, raw: Sequence[_Raw], define: De
     store = _types(path, type_, define)
     start_ns, last_ns = raw[0][0], -1
     for number, (received_ns, data) in enumerate(raw, start=1):
-        where = f"message {number} of {len(raw)} on {_line(topic)}"
+        where = f"message {number} of {len(raw)} on {one_line(topic)}"
         if data.startswith(_ZSTD_MAGIC):
             raise RecordingError(
-                f"{_line(path)}: expected plain messages, found compressed ones",
+                f"{one_line(path)}: expected plain messages, found compressed ones",
                 "name the folder that holds its metadata.yaml",
             )
         try:
             message = store.deserialize_cdr(data, type_)
             cdr = data if data.startswith(_CDR_LITTLE_ENDIAN) else bytes(store.serialize_cdr(message, type_))
-            value = _fields(message)
+            value = message_fields(message)
         except Exception as error:  # as above: a malformed message may fail anywhere in the generated decoder
             raise RecordingError(
-                f"{_line(path)}: expected {type_} in {where}, found other bytes ({_line(error)})", _HINT_DAMAGED
+                f"{one_line(path)}: expected {type_} in {where}, found other bytes ({one_line(error)})", HINT_DAMAGED
             ) from error
         if not _has_finite_positions(value):
             raise RecordingError(
-                f"{_line(path)}: expected a position in {where}, found a number that is not finite",
+                f"{one_line(path)}: expected a position in {where}, found a number that is not finite",
                 "play a recording in which every position is known",
             )
         last_ns = max(received_ns - start_ns, last_ns + 1)
@@ -260,7 +291,7 @@ def _types(path: Path, type_: str, define: Define | None) -> Typestore:
         definition = define(type_) if define is not None else None
         if definition is None:
             raise RecordingError(
-                f"{_line(path)}: expected messages of a known type, found {type_}, whose definition is missing",
+                f"{one_line(path)}: expected messages of a known type, found {type_}, whose definition is missing",
                 "bring it with `interfaces:` in the rubric or --interfaces FOLDER",
             )
         found = get_types_from_msg(definition, type_)
@@ -268,16 +299,17 @@ def _types(path: Path, type_: str, define: Define | None) -> Typestore:
     return store
 
 
-def _fields(message: Any) -> Mapping[str, Any]:
+def message_fields(message: Any) -> Mapping[str, Any]:
     """Return the fields of a message as plain values, named as in its definition, without what nobody judges."""
-    plain = {name: _plain(getattr(message, name)) for name in message.__dataclass_fields__ if name != _NOT_KEPT}
-    plain.pop("__msgtype__", None)
+    # what has a default is a constant of the type
+    names = [one.name for one in fields(message) if one.default is MISSING and one.name != _NOT_KEPT]
+    plain = {name: _plain(getattr(message, name)) for name in names}
     return {name: value for name, value in plain.items() if not isinstance(value, list) or len(value) <= MOST_ELEMENTS}
 
 
 def _plain(value: Any) -> Any:
     if hasattr(value, "__dataclass_fields__"):
-        return _fields(value)
+        return message_fields(value)
     if hasattr(value, "tolist"):
         return value.tolist()
     return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
@@ -295,8 +327,8 @@ def _has_finite_positions(value: Mapping[str, Any]) -> bool:
 
 def _ros_1(path: Path) -> RecordingError:
     return RecordingError(
-        f"{_line(path)}: expected a rosbag2 recording, found a ROS 1 bag",
-        "convert it with `rosbags-convert --src FILE.bag --dst FOLDER`",
+        f"{one_line(path)}: expected a rosbag2 recording, found a ROS 1 bag",
+        HINT_ROS_1,
     )
 
 
@@ -305,10 +337,12 @@ def _count(messages: int) -> str:
 
 
 def _too_short(path: Path, topic: str, what: str) -> RecordingError:
-    return RecordingError(f"{_line(path)}: expected a recording of {_line(topic)} with {what}", "record it for longer")
+    return RecordingError(
+        f"{one_line(path)}: expected a recording of {one_line(topic)} with {what}", "record it for longer"
+    )
 
 
-def _line(text: object, *, source: Path | None = None, limit: int = 5000) -> str:
+def one_line(text: object, *, source: Any = None, limit: int = 5000) -> str:
     """Turn foreign text into one printable line, without the path of a temporary source."""
     plain = str(text)
     if source is not None:

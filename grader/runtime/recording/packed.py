@@ -15,6 +15,7 @@ import msgspec
 from grader.runtime.model.errors import EvidenceError, HarnessError
 from grader.runtime.model.trace import (
     AssessedTrace,
+    BagContents,
     Delivery,
     Endpoint,
     Fault,
@@ -293,7 +294,10 @@ def _tested(row: Any) -> Tested:
 _PARTS: Mapping[Any, tuple[Any, Callable[[Any], Any]]] = {
     Start: (_START, _start),
     Tested: (_TESTED, _tested),
-    **{kind: (_row_of(kind), partial(_same, kind)) for kind in (WrittenFile, NewerPython, OtherNumpy, Sketch)},
+    **{
+        kind: (_row_of(kind), partial(_same, kind))
+        for kind in (WrittenFile, NewerPython, OtherNumpy, Sketch, BagContents)
+    },
 }
 #: The types of the fields of a trace but its observations: memory, the wire and evidence follow from them.
 _HINTS: Mapping[str, Any] = {

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from grader.runtime.host.packages import PackageLayout, layout_of
 from grader.runtime.model.quantities import MIB
+from grader.runtime.model.scenario import is_bag_file
 
 #: How many files are copied at most, and how many bytes in all: a program reads settings and small tables.
 MOST_FILES, MOST_BYTES = 64, MIB
@@ -31,6 +32,8 @@ def whole_submission(root: Path, most_bytes: int) -> tuple[str, ...] | None:
         for name in names:
             path = Path(folder, name)
             status = path.lstat()
+            if is_bag_file(name) and status.st_size > MOST_BYTES:  # judged by itself: it changes nothing for programs
+                continue
             left -= status.st_size
             if left < 0 or len(found) == MOST_OF_SUBMISSION or not stat.S_ISREG(status.st_mode):
                 return None

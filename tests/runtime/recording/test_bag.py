@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -19,9 +19,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from places import ROOT, SHARED
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from places import ROOT
+from recorded_bags import START_NS, TYPE, drive, odometry_cdr, others, write_bag
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import NS_PER_S
@@ -29,68 +29,12 @@ from grader.runtime.recording.bag import BagMinimum, read_bag
 from grader.runtime.stimuli.recorded import Recording, TimedMessage, window
 
 OWN = ROOT / "rubrics" / "exercise_2" / "odometry"
-STORE = get_typestore(Stores.ROS2_JAZZY)
-T = STORE.types
-TYPE = "nav_msgs/msg/Odometry"
-START_NS = 1_700_000_000 * NS_PER_S
 BOTH = pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
-
-
-def others(name: str) -> Path:
-    """Return a recording that other people made, or skip: they are not part of the project."""
-    path = SHARED / "bags" / name
-    if not path.exists():
-        pytest.skip(f"{name} is not beside this checkout")
-    return path
-
-
-def odometry_cdr(x: float, y: float = 2.0, *, little_endian: bool = True) -> bytes:
-    import numpy as np
-
-    point, quaternion, vector = (T[f"geometry_msgs/msg/{n}"] for n in ("Point", "Quaternion", "Vector3"))
-    pose = T["geometry_msgs/msg/Pose"](
-        position=point(x=x, y=y, z=0.25), orientation=quaternion(x=0.0, y=0.0, z=0.6, w=0.8)
-    )
-    twist = T["geometry_msgs/msg/Twist"](linear=vector(x=0.5, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=-0.125))
-    header = T["std_msgs/msg/Header"](stamp=T["builtin_interfaces/msg/Time"](sec=1, nanosec=2), frame_id="odom")
-    message = T[TYPE](
-        header=header,
-        child_frame_id="base_link",
-        pose=T["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=np.zeros(36)),
-        twist=T["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=np.zeros(36)),
-    )
-    return bytes(STORE.serialize_cdr(message, TYPE, little_endian=little_endian))
-
-
-def drive(count: int = 60, period_ns: int = NS_PER_S // 10) -> list[tuple[int, bytes]]:
-    """Return `count` messages as (receive time, bytes), x counting up by a hundredth."""
-    return [(START_NS + n * period_ns, odometry_cdr(n / 100)) for n in range(count)]
 
 
 def read_odometry(path: Path) -> Recording:
     """Read the odometry in a recording that has to last for 5 s."""
     return read_bag(path, "/odom", TYPE, least=BagMinimum(messages=20, span_ns=5 * NS_PER_S))
-
-
-def write_bag(
-    path: Path,
-    topics: dict[str, Sequence[tuple[int, bytes]]],
-    *,
-    plugin: StoragePlugin = StoragePlugin.MCAP,
-    compression: CompressionMode = CompressionMode.NONE,
-    types: dict[str, str] | None = None,
-) -> Path:
-    """Write a recording with these topics, of odometry unless `types` says otherwise."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    store.register(get_types_from_msg("int32 left\nint32 right\n", "robo_msgs/msg/Wheels"))
-    writer = Writer(path, version=9, storage_plugin=plugin)
-    writer.set_compression(compression, CompressionFormat.ZSTD)
-    with writer:
-        for topic, messages in topics.items():
-            connection = writer.add_connection(topic, (types or {}).get(topic, TYPE), typestore=store)
-            for t_ns, data in messages:
-                writer.write(connection, t_ns, data)
-    return path
 
 
 def refused(path: Path) -> str:

@@ -28,7 +28,7 @@ def test_provided_files_are_part_of_the_rubric(tmp_path: Path) -> None:
         (tmp_path / file.name).write_bytes(file.read_bytes())
     before = read_rubric(tmp_path / RUBRIC.name)
     assert [dict(s.provided) for s in before.scenarios] == [{"given.yaml": (tmp_path / "given.yaml").read_text()}, {}]
-    assert [s.handed_in for s in before.scenarios] == [("talker.py",), ("talker.py", "own.yaml")]
+    assert [s.wanted for s in before.scenarios] == [("talker.py",), ("talker.py", "own.yaml")]
     (tmp_path / "given.yaml").write_text("/**: {ros__parameters: {frame: odom}}\n")
     assert read_rubric(tmp_path / RUBRIC.name).digest != before.digest
 

@@ -77,4 +77,33 @@ class _Checks(Mapping[str, type]):
 
 
 CHECKS: Mapping[str, type] = _Checks()
-__all__ = ["CHECKS"]
+#: The checks that cannot judge a recording that a student has handed in: name -> what they ask that no recording holds.
+NOT_IN_BAGS: Mapping[str, str] = {
+    **dict.fromkeys(
+        (
+            "uses_logger",
+            "waits_gracefully",
+            "logs_received",
+            "logs_every",
+            "logs_values",
+            "logs_texts",
+            "logs_response",
+        ),
+        "what programs log",
+    ),
+    "logs_matching": "what programs log",
+    **dict.fromkeys(
+        ("subscribes", "bidirectional_graph", "qos", "node_name", "topic_names", "graph_edges"), "the graph of nodes"
+    ),
+    **dict.fromkeys(
+        ("service_available", "service_answers_all", "service_response", "service_function", "service_calls"),
+        "calls of services",
+    ),
+    **dict.fromkeys(("waits_for_service", "lifecycle_states"), "calls of services"),
+    **dict.fromkeys(("action_result", "action_feedback", "sends_goals", "cancels_goal", "after_goal"), "goals"),
+    **dict.fromkeys(("no_fault", "clean_shutdown"), "how programs end"),
+    **dict.fromkeys(("parameter_declared", "parameter_takes_effect"), "parameters of nodes"),
+    **dict.fromkeys(("source_uses", "source_avoids"), "the text of programs"),
+    "installs": "packages",
+}
+__all__ = ["CHECKS", "NOT_IN_BAGS"]

@@ -225,14 +225,14 @@ class Transform:
     @property
     def expected(self) -> str:
         rate = "" if self.rate is None else f" at {number(self.rate)} ± {number(self.rate_tolerance)} Hz"
-        return f"the transform {self.parent} → {self.child} on {' or '.join(self._topics)}{rate}"
+        return f"the transform {self.parent} → {self.child} on {' or '.join(self.topics)}{rate}"
 
     @property
-    def _topics(self) -> tuple[str, ...]:
+    def topics(self) -> tuple[str, ...]:
         return {True: ("/tf_static",), False: ("/tf",), None: ("/tf", "/tf_static")}[self.static]
 
     def judge(self, trace: Trace) -> Finding:
-        sent = [m for topic in self._topics for m in published(trace, topic, self.after_discovery)]
+        sent = [m for topic in self.topics for m in published(trace, topic, self.after_discovery)]
         found = [_Found(m.t_ns, t) for m in sent for t in _transforms(m)]
         wanted = (self.parent.lstrip("/"), self.child.lstrip("/"))
         mine = sorted((f for f in found if f.frames == wanted), key=lambda f: f.t_ns)
@@ -278,11 +278,11 @@ class Transform:
 
     def _absent(self, trace: Trace, found: list[_Found]) -> Finding:
         if not found:
-            other = {"/tf": "/tf_static", "/tf_static": "/tf"}.get(self._topics[0]) if self.static is not None else None
+            other = {"/tf": "/tf_static", "/tf_static": "/tf"}.get(self.topics[0]) if self.static is not None else None
             if other and published(trace, other):
-                reason = f"{self._topics[0]}: no transform; there are some on {other}"
-                return not_met(reason, hint=f"publish it on {self._topics[0]}", problem=ProblemKind.OTHER_NAME)
-            return explain_no_message(trace, self._topics[0])
+                reason = f"{self.topics[0]}: no transform; there are some on {other}"
+                return not_met(reason, hint=f"publish it on {self.topics[0]}", problem=ProblemKind.OTHER_NAME)
+            return explain_no_message(trace, self.topics[0])
         pairs = list(dict.fromkeys(f"{quote(p, 30)} → {quote(c, 30)}" for p, c in (f.frames for f in found)))
         reason = f"no transform {self.parent} → {self.child}; found {first_few(pairs)}"
         swapped = any(f.frames == (self.child.lstrip("/"), self.parent.lstrip("/")) for f in found)
@@ -292,7 +292,7 @@ class Transform:
     def drawing(self, trace: Trace) -> Drawing:
         """Return the numbers of the transform, and the time from each to the next if a rate is expected."""
         pair = (self.parent.lstrip("/"), self.child.lstrip("/"))
-        topics = [t for t in self._topics if published(trace, t)]
+        topics = [t for t in self.topics if published(trace, t)]
         found = [_Found(m.t_ns, t) for topic in topics for m in published(trace, topic) for t in _transforms(m)]
         mine = sorted((f for f in found if f.frames == pair), key=lambda f: f.t_ns)
         if not mine:
