@@ -48,15 +48,16 @@ from grader.course.classroom.renaming import with_renamed_files
 from grader.course.classroom.roster import RosterMatch, Table, match, read_roster
 from grader.course.classroom.store import BEFORE, REPORT, SEED_KEY, Conditions, Store, open_store
 from grader.course.classroom.watching import Watcher
-from grader.course.classroom.worker import GRADESCOPE, HANDED_BACK, HANDED_BACK_PAGE, PAGE
+from grader.course.classroom.worker import EVIDENCE, GRADESCOPE, HANDED_BACK, HANDED_BACK_PAGE, PAGE
 from grader.course.similarity.finding import find_similar, read_compared
-from grader.course.similarity.library import ComparedProgram, Handed, Similar
+from grader.course.similarity.library import ComparedProgram, ComparedTopic, Handed, Similar
 from grader.course.similarity.pages import MOST_PAGES, OVERVIEW, page_name, render_overview, render_pair, render_table
 from grader.grading.app.bags import read_given, read_recordings, recordings_digest
 from grader.grading.app.grade import read_exercises, wanted_files
 from grader.grading.app.interfaces import rubric_folders
 from grader.grading.app.request import GradeRequest
 from grader.grading.app.seeds import kept_key
+from grader.grading.evidence.store import open_evidence, run_of
 from grader.grading.model.exercise import Exercise
 from grader.grading.model.grading_options import GradingOptions, values
 from grader.grading.reporting.escape import json_value
@@ -65,7 +66,7 @@ from grader.grading.reporting.json_report import ReportData
 from grader.grading.reporting.rejudged import ReportChange, change, render_changes_table
 from grader.grading.rubrics.draws import First
 from grader.runtime.interface_packages import offered_digest
-from grader.runtime.model.errors import ClassError, GraderError, HarnessError, SubmissionError
+from grader.runtime.model.errors import ClassError, EvidenceError, GraderError, HarnessError, SubmissionError
 from grader.runtime.model.wording import printable
 from grader.runtime.temp_dirs import scratch_folder
 
@@ -128,7 +129,8 @@ def grade_class(
         began = time.monotonic()
         try:
             now = run.grade(due, warn, make_scheduler)
-            graded = _compared(Graded(book(), len(due), before, now, changes=_changes(store)), intake, course, store)
+            made = Graded(book(), len(due), before, now, changes=_changes(store))
+            graded = _compared(made, intake, course, store, exercises)
         except (KeyboardInterrupt, HarnessError):
             with suppress(GraderError):  # the error that stopped the run is more useful
                 stopped = book()
@@ -227,11 +229,13 @@ def _book(  # noqa: PLR0913  each comes from a different source
     )
 
 
-def _compared(graded: Graded, intake: Intake, course: ClassRequest, store: Store) -> Graded:
+def _compared(
+    graded: Graded, intake: Intake, course: ClassRequest, store: Store, exercises: Sequence[Exercise]
+) -> Graded:
     """Compare the submissions if requested, and add the result to the class."""
     if course.given is None:
         return replace(graded, links=link_of_earlier_run(store))
-    found, files = compare_class(intake.entries, graded.book.rows, course.given, store)
+    found, files = compare_class(intake.entries, graded.book.rows, course.given, store, exercises)
     return replace(graded, links=(_link(found),), remarks=(f"similar submissions: {found}",), files=files)
 
 
@@ -359,14 +363,23 @@ def _text(path: Path) -> str:
 
 
 def compare_class(
-    entries: Sequence[HandedInEntry], rows: Sequence[Row], given: Sequence[ComparedProgram], store: Store
+    entries: Sequence[HandedInEntry],
+    rows: Sequence[Row],
+    given: Sequence[ComparedProgram],
+    store: Store,
+    exercises: Sequence[Exercise] = (),
 ) -> tuple[str, tuple[Path, ...]]:
     """Compare all submissions, write pages and a table, and return what was found and the files to open.
 
-    The files handed out to everyone, `given`, are left out. Raises HarnessError if the pages cannot be written.
+    The files handed out to everyone, `given`, are left out. Recordings that exercises ask for are compared by the
+    evidence that was kept of them. Raises HarnessError if the pages cannot be written.
     """
     row_of = {row.name: row for row in rows}
-    handed = [_handed(entry, row_of.get(entry.name)) for entry in entries]
+    bags = [replace(e, scenarios=own) for e in exercises if (own := tuple(s for s in e.scenarios if s.handed_in))]
+    handed = [
+        replace(_handed(entry, row_of.get(entry.name)), recorded=_recorded(store.place(entry.name) / EVIDENCE, bags))
+        for entry in entries
+    ]
     similar = find_similar(_with_distinct_labels(handed), given)
     pages = [page_name(rank) for rank in range(min(MOST_PAGES, len(similar.pairs)))]
     for rank, name in enumerate(pages):
@@ -400,6 +413,24 @@ def _handed(entry: HandedInEntry, row: Row | None) -> Handed:
     )
 
 
+def _recorded(evidence: Path, exercises: Sequence[Exercise]) -> tuple[ComparedTopic, ...]:
+    """Return what was judged of the recordings that one submission handed in; nothing without evidence of any."""
+    if not exercises:
+        return ()
+    try:
+        kept = open_evidence(evidence)
+        held = [one for one in exercises if one.id in kept.exercises]
+        traces = run_of(kept, held).traces.values() if held else ()
+    except EvidenceError:
+        return ()
+    return tuple(
+        ComparedTopic(trace.bag.file, topic, different, digest)
+        for trace in traces
+        if trace.bag is not None
+        for topic, different, digest in trace.bag.contents
+    )
+
+
 def _with_distinct_labels(handed: Sequence[Handed]) -> list[Handed]:
     """Add the name of the submission to labels that occur more than once."""
     count = Counter(one.label for one in handed)
@@ -407,6 +438,7 @@ def _with_distinct_labels(handed: Sequence[Handed]) -> list[Handed]:
 
 
 def _counted(similar: Similar) -> str:
-    pairs = f"{len(similar.pairs)} pair{'' if len(similar.pairs) == 1 else 's'}"
-    same = len(similar.same)
-    return f"{pairs}, {same} file{'' if same == 1 else 's'} handed in more than once" if same else pairs
+    parts = [f"{len(similar.pairs)} pair{'' if len(similar.pairs) == 1 else 's'}"]
+    for count, what in ((len(similar.same), "file"), (len(similar.messages), "recording")):
+        parts += [f"{count} {what}{'' if count == 1 else 's'} handed in more than once"] if count else []
+    return ", ".join(parts)

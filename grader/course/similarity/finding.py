@@ -18,6 +18,7 @@ from grader.course.similarity.library import (
     Likeness,
     Pair,
     Print,
+    SameMessages,
     SameText,
     Side,
     Similar,
@@ -121,6 +122,7 @@ def find_similar(handed: Sequence[Handed], given: Sequence[ComparedProgram], lim
         threshold=THRESHOLD,
         least_share=LEAST_SHARE,
         given_files=tuple(program.name for program in given),
+        messages=tuple(_same_messages(kept)),
     )
 
 
@@ -217,3 +219,27 @@ def _same(handed: Sequence[Handed]) -> list[SameText]:
         if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2))
     ]
     return sorted(found, key=lambda same: (-len(same.holders), same.file, same.holders[0].name))
+
+
+#: Fewer different messages on a topic prove nothing: a robot that stands still, or a command that is repeated, gives
+#: the same ones to everybody.
+LEAST_DIFFERENT = 20
+
+
+def _same_messages(handed: Sequence[Handed]) -> list[SameMessages]:
+    """Return the recordings of several people that hold the same messages, whenever these were recorded."""
+    holders: dict[tuple[str, str], dict[str, tuple[Handed, str]]] = defaultdict(dict)
+    for one in handed:
+        for held in one.recorded:
+            if held.different >= LEAST_DIFFERENT:
+                holders[held.topic, held.digest].setdefault(one.name, (one, held.file))
+    topics: dict[tuple[tuple[str, str], ...], list[str]] = defaultdict(list)
+    known: dict[tuple[tuple[str, str], ...], tuple[tuple[Handed, str], ...]] = {}
+    for (topic, _), found in holders.items():
+        who = tuple(found.values())
+        if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2)):
+            key = tuple((one.name, file) for one, file in who)
+            known[key] = who
+            topics[key].append(topic)
+    same = [SameMessages(tuple(sorted(topics[key])), who) for key, who in known.items()]
+    return sorted(same, key=lambda one: (-len(one.holders), one.topics, one.holders[0][0].name))

@@ -26,8 +26,18 @@ class ComparedProgram:
 
 
 @dataclass(frozen=True, slots=True)
+class ComparedTopic:
+    """What a recording that was handed in holds on a topic."""
+
+    file: str  # the recording, relative to the submission
+    topic: str
+    different: int  # how many different messages there are
+    digest: str  # of all messages in their order, without the times at which they were recorded and stamped
+
+
+@dataclass(frozen=True, slots=True)
 class Handed:
-    """The programs of one submission."""
+    """The programs and recordings of one submission."""
 
     name: str
     label: str
@@ -35,6 +45,7 @@ class Handed:
     passed_over: tuple[str, ...] = ()  # files that cannot be compared, and why; one sentence each
     own: tuple[str, ...] = ()  # names of other submissions by the same person, which are not compared with it
     reported: bool = False
+    recorded: tuple[ComparedTopic, ...] = ()  # what was judged of the recordings that were handed in
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +102,14 @@ class SameText:
 
 
 @dataclass(frozen=True, slots=True)
+class SameMessages:
+    """Submissions whose recordings hold the same messages on some topics, each with the name of its recording."""
+
+    topics: tuple[str, ...]
+    holders: tuple[tuple[Handed, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Similar:
     """The similar submissions of a class."""
 
@@ -102,6 +121,7 @@ class Similar:
     threshold: float = 0.0
     least_share: float = 0.0
     given_files: tuple[str, ...] = ()
+    messages: tuple[SameMessages, ...] = ()  # messages that several have recorded, those of most people first
 
 
 #: Characters of a piece, with all names shortened to one.

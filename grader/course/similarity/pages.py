@@ -41,7 +41,7 @@ class ShownLine:
 
 
 def render_overview(similar: Similar) -> str:
-    """Render the page that lists all pairs and identical files."""
+    """Render the page that lists all pairs, identical files, and recordings of the same messages."""
     return _template("overview.html").render(
         similar=similar,
         pages=[page_name(rank) for rank in range(min(MOST_PAGES, len(similar.pairs)))],
@@ -84,6 +84,12 @@ def render_table(similar: Similar) -> str:
         for other in same.holders[1:]:
             sides = (*_cells(first, same.file, 1.0), *_cells(other, same.file, 1.0))
             writer.writerow(["identical", "", *sides, ""])
+    for recorded in similar.messages:
+        topics = " ".join(recorded.topics)
+        (first, its), *others = recorded.holders
+        for other, theirs in others:
+            cells = (*_cells(first, f"{its}: {topics}", 1.0), *_cells(other, f"{theirs}: {topics}", 1.0))
+            writer.writerow(["same messages", "", *cells, ""])
     return text.getvalue()
 
 

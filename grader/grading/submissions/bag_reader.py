@@ -62,6 +62,8 @@ _MOST_TOPICS = 500
 _TOPIC = re.compile(r"(?:/[A-Za-z_][A-Za-z0-9_]*)+")
 _TYPE = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*")
 _LONGEST_NAME = 255
+#: A time of a message in JSON; inside of a text, quotes would have a backslash.
+_STAMP = re.compile(r'"stamp": \{"sec": -?[0-9]+, "nanosec": [0-9]+\}')
 #: Times of recordings are nanoseconds in 63 bits.
 _MOST_NS = 2**63 - 1
 #: Seconds of processor time that are left to tell that the others are used up.
@@ -374,10 +376,12 @@ class _Reading:
         else:
             value = _decoded(self.asked["bag"], store, connection, self.counts[topic], data)
         kind = Delivery if topic in limits["given"] else Message
-        tag, _, *others = observation_to_json(kind(0, topic, type_, value, b"" if large else data))
-        self.rows.append((t_ns, f"[{json.dumps(tag)}, ", f", {json.dumps(others)[1:]}"))
-        unstamped = json.dumps(_unstamped(value), default=str).encode() if value else data
-        self.contents.setdefault(topic, _Contents()).add(unstamped)
+        row = observation_to_json(kind(0, topic, type_, value, b"" if large else data))
+        tag, _, *names, fields, cdr = row[:6]
+        text = json.dumps(fields)
+        self.rows.append((t_ns, f"[{json.dumps(tag)}, ", f", {json.dumps(names)[1:-1]}, {text}, {json.dumps(cdr)}]"))
+        # Without what says when it was stamped: recording again may change nothing else.
+        self.contents.setdefault(topic, _Contents()).add(_STAMP.sub("", text).encode() if value else data)
         return True
 
 
@@ -389,13 +393,6 @@ def _decoded(where: str, store: Any, connection: Any, number: int, data: bytes) 
     except Exception as error:  # a malformed message may fail anywhere in the generated decoder
         text = f"{one_line(where)}: expected {connection.msgtype} in message {number} on {connection.topic}"
         raise RecordingError(f"{text}, found other bytes ({one_line(error, limit=200)})", HINT_DAMAGED) from error
-
-
-def _unstamped(value: Any) -> Any:
-    """Return fields without those that say when they were stamped: recording again may change nothing else."""
-    if isinstance(value, Mapping):
-        return {name: _unstamped(inner) for name, inner in value.items() if name != "stamp"}
-    return [_unstamped(item) for item in value] if isinstance(value, list) else value
 
 
 def _read(asked: Mapping[str, Any]) -> Iterator[bytes]:

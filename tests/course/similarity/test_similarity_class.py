@@ -11,6 +11,8 @@ import copies
 import pytest
 from class_samples import FakeScheduler, course, grade, hand_in, scores
 from click.testing import CliRunner
+from recorded_bags import drive, write_bag
+from rosbags.rosbag2 import StoragePlugin
 from sample_folders import folder_of
 
 from grader.cli.main import app
@@ -117,3 +119,29 @@ def test_a_template_that_cannot_be_used_is_told_first(source: Path, options: Seq
     assert done.exit_code == 2
     assert said in done.stderr
     assert not (source.parent / "o").exists()
+
+
+@pytest.mark.sandbox
+@pytest.mark.slow
+def test_recordings_that_were_recorded_again_are_named(tmp_path: Path) -> None:
+    """Bob played Ada's and recorded it, Cleo drove herself; nobody handed in a program."""
+    rubric = tmp_path / "square.yaml"
+    rubric.write_text(
+        "schema: grader/rubric/v1\nexercise: {id: square, number: 1, title: A square}\n"
+        "scenarios:\n  - {id: drive, handed_in: {bag: '*'}}\n"
+        "criteria:\n  - {id: odometry, title: Odometry, points: 5, scenario: drive, "
+        "check: {publishes: {topic: /odom, type: nav_msgs/msg/Odometry}}}\n"
+    )
+    later = [(t_ns + 3_600_000_000_007, data) for t_ns, data in drive(60, 99_000_000)]
+    write_bag(tmp_path / "in" / "ada" / "run", {"/odom": drive(60)})
+    write_bag(tmp_path / "in" / "bob" / "mine", {"/odom": later}, plugin=StoragePlugin.SQLITE3)
+    write_bag(tmp_path / "in" / "cleo" / "run", {"/odom": drive(60)[::2]})
+    out = tmp_path / "out"
+    given = ["batch", str(tmp_path / "in"), "-o", str(out), "--rubric", str(rubric), "--jobs", "1", "--similarity"]
+    done = CliRunner().invoke(app, given)
+    assert done.exit_code == 0, done.output
+    assert "0 pairs, 1 recording handed in more than once" in done.output
+    (row,) = [line.split(",") for line in (out / "similarity.csv").read_text().splitlines()[1:]]
+    assert (row[0], row[2], row[4], row[6], row[8]) == ("same messages", "ada", "run: /odom", "bob", "mine: /odom")
+    students = json.loads((out / "batch.json").read_text())["students"]
+    assert [each["score"] for each in students] == [5, 5, 5]

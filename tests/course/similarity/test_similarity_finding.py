@@ -18,12 +18,13 @@ from grader.course.similarity import finding
 from grader.course.similarity.finding import (
     COMMON_LEAST,
     COMMON_MOST,
+    LEAST_DIFFERENT,
     MAX_BYTES,
     find_similar,
     read_compared,
     read_templates,
 )
-from grader.course.similarity.library import Handed, Similar
+from grader.course.similarity.library import ComparedTopic, Handed, Similar
 from grader.runtime.model.errors import ClassError
 
 #: Programs of people who do not know each other.
@@ -260,3 +261,31 @@ def test_given_code_has_to_be_there(tmp_path: Path) -> None:
     with pytest.raises(ClassError, match="expected a folder with the Python files"):
         read_templates([tmp_path])
     assert {program.name for program in read_templates([ROOT / "student_template"])} >= {FILE, "fan_controller.py"}
+
+
+def recorder(name: str, *recorded: ComparedTopic, own: tuple[str, ...] = ()) -> Handed:
+    return Handed(name, name, (), recorded=recorded, own=own)
+
+
+def on(topic: str, digest: str, different: int = 50, file: str = "run") -> ComparedTopic:
+    return ComparedTopic(file, topic, different, digest)
+
+
+def test_recordings_of_the_same_messages_are_listed_with_their_topics() -> None:
+    ada = recorder("ada", on("/odom", "1"), on("/scan", "2"), on("/imu", "3"))
+    bob = recorder("bob", on("/odom", "1", file="bags/mine"), on("/scan", "2", file="bags/mine"), on("/imu", "4"))
+    cleo = recorder("cleo", on("/odom", "5"))
+    (same,) = find_similar([ada, bob, cleo], ()).messages
+    assert same.topics == ("/odom", "/scan")
+    assert [(one.name, file) for one, file in same.holders] == [("ada", "run"), ("bob", "bags/mine")]
+
+
+def test_few_different_messages_prove_nothing() -> None:
+    """A command that is repeated is the same for everybody."""
+    commands = [recorder(name, on("/cmd_vel", "1", LEAST_DIFFERENT - 1)) for name in ("ada", "bob")]
+    assert find_similar(commands, ()).messages == ()
+
+
+def test_recordings_of_one_person_are_not_compared() -> None:
+    twins = [recorder("ada", on("/odom", "1"), own=("ada-2",)), recorder("ada-2", on("/odom", "1"), own=("ada",))]
+    assert find_similar(twins, ()).messages == ()

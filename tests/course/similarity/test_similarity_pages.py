@@ -12,7 +12,16 @@ import pytest
 from copies import handed
 
 from grader.course.similarity import pages
-from grader.course.similarity.library import ComparedProgram, Handed, Likeness, Pair, SameText, Side, Similar
+from grader.course.similarity.library import (
+    ComparedProgram,
+    Handed,
+    Likeness,
+    Pair,
+    SameMessages,
+    SameText,
+    Side,
+    Similar,
+)
 from grader.course.similarity.pages import (
     ShownLine,
     marked_lines,
@@ -53,7 +62,18 @@ def similar(
     same = (SameText(file, tuple(sides)),)
     given = ((sides[0], file),)
     found = (Pair(sides[0], sides[1], (likeness,)),) * count
-    return Similar(sides, found, same, given, common_from=4, threshold=0.65, least_share=0.4, given_files=(file,))
+    messages = (SameMessages(("/odom", "/scan"), tuple((side, file) for side in sides)),)
+    return Similar(
+        sides,
+        found,
+        same,
+        given,
+        common_from=4,
+        threshold=0.65,
+        least_share=0.4,
+        given_files=(file,),
+        messages=messages,
+    )
 
 
 @pytest.mark.parametrize("render", [render_overview, lambda found: render_pair(found, 0)])
@@ -75,6 +95,17 @@ def test_a_page_runs_nothing_and_asks_for_nothing() -> None:
     for page in (render_overview(similar()), render_pair(similar(), 0)):
         assert "default-src 'none'; style-src 'unsafe-inline'" in page
         assert not {"script", "link", "img"} & Elements(page).tags
+
+
+def test_recordings_of_the_same_messages_are_named_with_their_topics() -> None:
+    text = " ".join(Elements(render_overview(similar())).text.split())
+    assert "Recordings of the same messages" in text
+    assert "/odom, /scan (2): ada" in text
+    rows = list(csv.reader(io.StringIO(render_table(similar()))))
+    (row,) = [row for row in rows if row[0] == "same messages"]
+    assert row[2] == "ada"
+    assert row[6] == "bob"
+    assert row[4].endswith(": /odom /scan")
 
 
 def test_the_words_are_neutral() -> None:
