@@ -62,17 +62,16 @@ def stage_submission(
     """Copy a submission and find the wanted files in it.
 
     Args:
-        path: A folder, an archive or one .py file, as the user typed it. If a folder or archive holds no .py file but
-            one archive, that archive is used: learning platforms deliver uploads this way. Where a recording is
-            wanted, it may also be one.
+        path: A folder, an archive, or one .py file or wanted file, as the user typed it. If a folder or archive holds
+            neither but one archive, that archive is used: learning platforms deliver uploads this way.
         wanted: File names of all exercises being graded, and patterns of recordings; a missing file has the names that
             look like it.
         into: Empty folder that receives the copy.
         meant: Wanted file name -> the path inside the submission that is meant, where several files may have the name.
 
     Raises:
-        SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file although
-            only programs are wanted, a limit is exceeded, or an archive cannot be used.
+        SubmissionError: There is no such path, it is not a folder, archive or .py file, it holds no .py file and
+            no wanted one although no recording is wanted, a limit is exceeded, or an archive cannot be used.
         HarnessError: The copy cannot be written, or no process can be started that reads project files.
     """
     return stage_collected(collect_submission(path, wanted, into), path, wanted, into, meant)
@@ -174,7 +173,7 @@ def _collect_file(source: Path, wanted: Sequence[str], where: str) -> Collected:
 
 
 def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected:
-    """Return a .py file, a recording where one is wanted, or the files of an archive."""
+    """Return a .py file, another one that is wanted, or the files of an archive."""
     if not source.is_file():
         raise SubmissionError(f"{where}: expected {_EXPECTED}, found a device, pipe or socket")
     # Most submissions are folders.
@@ -193,7 +192,8 @@ def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected
         return Collected(((source.name, content),))
     kind = archive_kind(content[:HEAD_BYTES])
     # A program may look like an old tar archive, by chance or on purpose.
-    if source.suffix.casefold() == ".py" and kind in (None, "tar"):
+    is_program = source.suffix.casefold() == ".py" and kind in (None, "tar")
+    if is_program or (kind is None and source.name in _file_names(wanted)):
         if len(content) > MAX_FILE_BYTES:
             raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
         return Collected(((source.name, content),))
@@ -218,12 +218,12 @@ def _other_kind(source: Path, wanted: Sequence[str]) -> str:
 
 
 def _with_work(collected: Collected, wanted: Sequence[str], where: str) -> Collected:
-    """Return the files if there are .py files or wanted recordings among them, or else those of the only archive.
+    """Return the files if .py files or wanted ones are among them, or else those of the only archive.
 
     Where a recording is wanted, a submission without any is graded: its criteria say what is missing.
     """
     names, bags = [name for name, _ in collected.files], any(map(is_bag_pattern, wanted))
-    if _has_python(names) or (bags and any(map(is_bag_file, names))):
+    if _has_work(names, wanted):
         return collected
     from grader.grading.submissions.archives import collect_archive  # noqa: PLC0415 - as above
 
@@ -235,10 +235,21 @@ def _with_work(collected: Collected, wanted: Sequence[str], where: str) -> Colle
     name, packed = archives[0]
     inside = f"{where.rstrip('/')}/{printable(name)}"
     inner = collect_archive(packed, where=inside, limits=limits_for(wanted))
-    if not bags and not _has_python(name for name, _ in inner.files):
+    if not bags and not _has_work([name for name, _ in inner.files], wanted):
         raise _no_python(inner, wanted, inside)
     notes = (f"the contents of {printable(name)} were graded", *collected.notes, *inner.notes)
     return Collected(inner.files, notes, inner.too_large)
+
+
+def _has_work(names: Sequence[str], wanted: Sequence[str]) -> bool:
+    """Whether there is a .py file or a wanted file, such as a launch file in XML or a recording."""
+    bags, others = any(map(is_bag_pattern, wanted)), _file_names(wanted)
+    return _has_python(names) or any((bags and is_bag_file(n)) or n.rpartition("/")[2] in others for n in names)
+
+
+def _file_names(wanted: Iterable[str]) -> set[str]:
+    """Return the wanted files; `PACKAGE/NAME` is an executable, whose file may have any name."""
+    return {name for name in wanted if "/" not in name}
 
 
 def _has_python(names: Iterable[str]) -> bool:

@@ -397,6 +397,18 @@ def test_what_cannot_be_graded_is_one_clear_line(
     assert "\n" not in caught.value.message + caught.value.hint
 
 
+@pytest.mark.parametrize("typed", ["", "robot.launch.xml"])
+def test_a_wanted_file_alone_can_be_graded(work: Path, into: Path, typed: str) -> None:
+    """A launch file in XML is all that a student may have written; other files of its kind are not work."""
+    put(work, "robot.launch.xml", "<launch/>")
+    wanted = ("robot.launch.xml", "talker.py")
+    submission = stage_submission(str(work / typed), wanted, into)
+    assert submission.files["robot.launch.xml"].found == "robot.launch.xml"
+    assert submission.files["talker.py"].found is None
+    with pytest.raises(SubmissionError, match="expected"):
+        stage_submission(str(work / typed), WANTED, into)
+
+
 def test_an_empty_folder_is_an_error(work: Path, into: Path) -> None:
     """A folder without any file has no .py file either."""
     with pytest.raises(SubmissionError, match="expected at least one \\.py file, found none"):
