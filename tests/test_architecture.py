@@ -62,7 +62,7 @@ READS_TEXT = {
     "grading/reporting/audience.py": "takes the parts with numbers out of what a student sees",
     "grading/reporting/text.py": "does not name a place twice",
     "grading/reporting/wording.py": "leaves out how every reason of a blocked criterion begins",
-    "world/world.py": "waits for what a program logs or writes",
+    "world/observed.py": "waits for what a program logs or writes",
 }
 
 

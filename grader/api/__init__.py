@@ -145,8 +145,8 @@ if TYPE_CHECKING:
     from grader.world.opening import Worlds as Worlds
     from grader.world.opening import open_world as open_world
     from grader.world.programs import Program as Program
-    from grader.world.world import Failure as Failure
-    from grader.world.world import Launched as Launched
+    from grader.world.running import Failure as Failure
+    from grader.world.running import Launched as Launched
     from grader.world.world import World as World
 
 #: The public names by topic and by the module that they are in.
@@ -212,7 +212,8 @@ CONTENTS: dict[str, dict[str, str]] = {
     },
     "Own nodes, step by step": {
         "grader.world.opening": "open_world Worlds",
-        "grader.world.world": "World Launched Failure",
+        "grader.world.world": "World",
+        "grader.world.running": "Launched Failure",
         "grader.world.asking": "Received PendingCall GoalHandle GoalResult",
         "grader.world.frames": "FrameTransform",
         "grader.world.programs": "Program",

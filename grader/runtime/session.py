@@ -17,6 +17,7 @@ from grader.runtime.model.checkup import Property
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.projects import Project
 from grader.runtime.model.trace import AssessedTrace
+from grader.runtime.plan import Plan
 from grader.runtime.programs.shares import install_shares
 from grader.runtime.ros_installation import RosInstallation, find_ros
 from grader.runtime.sandbox.choose import OWN_PROGRAMS, Machine, TierChoice, choose_isolation
@@ -24,7 +25,7 @@ from grader.runtime.sandbox.protocol import Isolation
 from grader.runtime.supervisor.byte_code import compile_own
 from grader.runtime.supervisor.next_recording import AUTO, VIRTUAL, WALL, NextRecording, next_recording
 from grader.runtime.supervisor.real_time_budget import RealTimeBudget
-from grader.runtime.supervisor.stepping import SteppedRun
+from grader.runtime.supervisor.stepping import LentWorker, SteppedRun, lend_stepped
 from grader.runtime.supervisor.supervisor import MARGIN_S, TRIES, Job, Recorder, WorkerLostError
 from grader.runtime.supervisor.test_runs import VARIABLE, TestJob, collected_tests, record_tests
 from grader.runtime.temp_dirs import scratch_folder
@@ -37,6 +38,7 @@ __all__ = [
     "VIRTUAL",
     "WALL",
     "Job",
+    "LentWorker",
     "RealTimeBudget",
     "RecordingSession",
     "SteppedRun",
@@ -159,6 +161,17 @@ class RecordingSession:
     ) -> dict[Key, AssessedTrace]:
         """Run tests of rubrics and return their traces, in the same order; raises EnvironmentFault without pytest."""
         return record_tests(self.recorder, jobs, progress, budget)
+
+    def begin(self, plan: Plan) -> LentWorker:
+        """Begin a run that is stepped, and return the worker that it has to itself; see `SteppedRun`.
+
+        Args:
+            plan: Limits, seed and clock of the run.
+
+        Raises:
+            HarnessError: No worker can be started.
+        """
+        return lend_stepped(self.recorder, plan)
 
     def install_shares(
         self, root: Path, projects: Sequence[Project], prefix: Path

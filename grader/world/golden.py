@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from grader.grading.model.wording import moment, quote
+from grader.world.errors import RecordingDiffers
 
 #: What a difference shows of a value, in characters.
 MOST_SHOWN = 80
@@ -39,6 +40,37 @@ def read_kept(path: Path) -> list[KeptMessage]:
                 f"{path}:{number}: expected a message of a kept recording, found {quote(line, 40)}"
             ) from error
     return found
+
+
+def write_kept(path: Path, messages: Sequence[KeptMessage]) -> None:
+    """Write a recording, into a folder that is created if it is not there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(kept_lines(messages), encoding="utf-8")
+
+
+def compare_with_kept(
+    path: Path,
+    now: Sequence[KeptMessage],
+    topics: Sequence[str],
+    tolerance: float | Mapping[str, float],
+    late_ns: int | None,
+) -> None:
+    """Compare messages with a recording; raises RecordingDiffers if they differ, or if there is none.
+
+    Args:
+        path: The recording.
+        now: The messages.
+        topics: The topics that count; none for all.
+        tolerance: What numbers may differ by; for all topics or by topic.
+        late_ns: What times may differ by; None for anything.
+    """
+    __tracebackhide__ = True
+    if not path.is_file():
+        raise RecordingDiffers(f"{path}: expected a recording, found none; pytest --ros-update writes it")
+    kept = [one for one in read_kept(path) if not topics or one.topic in topics]
+    by_topic = tolerance if isinstance(tolerance, Mapping) else {one.topic: tolerance for one in (*kept, *now)}
+    if differs := difference_from_kept(kept, now, by_topic, late_ns):
+        raise RecordingDiffers(f"{differs}; recorded in {path}, which pytest --ros-update renews")
 
 
 def difference_from_kept(

@@ -11,57 +11,31 @@ import re
 import socket
 import sys
 from collections.abc import Generator, Iterator, Mapping
-from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from grader.grading.judging.findings import explain_no_message, explain_no_server, explain_no_subscription
-from grader.grading.model.wording import first_few, nearest
-from grader.runtime.message_classes import built, message_class
+from grader.grading.model.wording import first_few
 from grader.runtime.model.author_files import error_words, line_of
-from grader.runtime.model.errors import GraderError, HarnessError, SubmissionError
-from grader.runtime.model.scenario import is_launch_file
-from grader.runtime.model.trace import Message, unmet_policy
-from grader.runtime.plan import Plan, PlannedStart, derive
+from grader.runtime.model.errors import GraderError, HarnessError
+from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import from_json, observation_to_json, to_json
-from grader.runtime.session import TestJob, WorkerLostError
-from grader.runtime.simulation import WallMap
+from grader.runtime.session import LentWorker, TestJob, WorkerLostError
 from grader.runtime.simulation.loading import SimulationError
-from grader.runtime.steps import LaunchFailedError
-from grader.world import telling
 from grader.world.errors import NoMessage, ParameterRejected, ProgramFailed, StepTimeout, WrongType
-from grader.world.programs import NAMED_SO, Found, Runnable
+from grader.world.submitted import LaunchFailed, NotHandedIn, graded_world
 from grader.world.world import World
 
 #: What `@pytest.mark.ros` takes in a rubric.
 OPTIONS = ("seed", "delay", "lose")
 #: Modules that rosidl generates: what fails there is a value that no field takes, which the test has written.
 _GENERATED = re.compile(r"\w+\.(msg|srv|action)\._\w+")
-_WORLD: pytest.StashKey[GradedWorld] = pytest.StashKey()
+_WORLD: pytest.StashKey[World] = pytest.StashKey()
 _FOUND: pytest.StashKey[dict[str, Any]] = pytest.StashKey()
 
 
-class NotHandedIn(SubmissionError):  # noqa: N818 - reads as what happened
-    """A program of the rubric that the submission lacks.
-
-    Args:
-        name: Its name.
-    """
-
-    def __init__(self, name: str) -> None:
-        super().__init__(f"{name}: not in the submission")
-        self.name = name
-
-
-class LaunchFailed(AssertionError):  # noqa: N818 - the same
-    """A launch file of the submission raised an exception."""
-
-
 class SupervisorLine:
-    """The connection to the supervisor, which stands in for its recorder and for the worker that it lends."""
+    """The connection to the supervisor, through which the worker is reached that it lends."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._stream = connection.makefile("rw", encoding="utf-8")
@@ -87,135 +61,18 @@ class SupervisorLine:
         answer: dict[str, Any] = json.loads(line)
         return answer
 
-    def lend(self) -> SupervisorLine:
-        """Return the worker, which is reached in the same way."""
-        return self
-
-    def step(self, plan: Plan) -> None:
-        """Begin a run."""
+    def begin(self, plan: Plan) -> LentWorker:
+        """Begin a run in a worker of the supervisor."""
         self.ask({"lend": to_json(plan)})
+        return LentWorker(self, self._give_back)
 
     def exchange(self, told: Mapping[str, Any] | None) -> dict[str, Any]:
         """Tell the worker something, and return what it says."""
         answer: dict[str, Any] = self.ask({"tell": told})["told"]
         return answer
 
-    def take_back(self, _: SupervisorLine, *, usable: bool) -> None:
-        """Give the worker back."""
+    def _give_back(self, *, usable: bool) -> None:
         self.ask({"back": usable})
-
-
-class GradedWorld(World):
-    """The world of a test of a rubric: it runs the programs of a submission in the sandbox.
-
-    Args:
-        line: To the supervisor.
-        job: The test, and what was handed in.
-        options: Of the marker `ros`.
-    """
-
-    def __init__(self, line: SupervisorLine, job: TestJob, options: Mapping[str, Any]) -> None:
-        seed = options.get("seed")
-        session: Any = SimpleNamespace(recorder=line)
-        plan = replace(job.plan, processes=(), starts=(), duration_ns=0, drawn_order=seed is not None)
-        self._job = job
-        self._provided = job.provided
-        super().__init__(
-            session,
-            (),
-            seed=job.seed if seed is None else seed,
-            name=plan.scenario,
-            delay=options.get("delay"),
-            lose=options.get("lose"),
-            plan=plan,
-        )
-
-    @property
-    def full(self) -> str:
-        """The limit that ended the recording, as a sentence; empty if none did."""
-        return self._run.full
-
-    def _simulations_by_name(self) -> Mapping[str, tuple[str, bytes]]:
-        return {name: (path, content) for name, path, content in self._job.test.simulations}
-
-    def _maps(self) -> Mapping[str, WallMap]:
-        return dict(self._job.test.maps)
-
-    def _found(self, program: Runnable) -> Found:
-        if callable(program):
-            text = f"{getattr(program, '__name__', program)}: expected the name of a program that is handed in"
-            raise SubmissionError(text, "a test of a rubric imports nothing of a submission")
-        wanted = str(program)
-        if wanted in self._job.missing:
-            raise NotHandedIn(wanted)
-        for name, file, executable in self._job.files:
-            if name == wanted:
-                return Found(name, Path(self._job.plan.root), file, executable, self._job.plan.projects)
-        known = [*(name for name, _, _ in self._job.files), *self._job.missing]
-        close = nearest(wanted, known)
-        hint = f"did you mean {close}?" if close else f"name it under `files`, which has {first_few(known)}"
-        raise SubmissionError(f"{wanted}: expected a program of the rubric, found none", hint)
-
-    def _found_launch_file(self, file: str | Path) -> tuple[Found, tuple[tuple[str, str], ...]]:
-        name = str(file)
-        own = dict(self._provided)
-        found = Found(name, Path(self._job.plan.root), name) if name in own else self._found(name)
-        if not is_launch_file(name):
-            raise SubmissionError(f"{name}: expected a launch file", NAMED_SO)
-        return found, self._job.known
-
-    def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Any:
-        """Start the nodes that a launch file describes; see `World.launch`."""
-        __tracebackhide__ = True
-        try:
-            return super().launch(file, arguments=arguments)
-        except LaunchFailedError as error:
-            if str(file) in dict(self._provided):
-                raise
-            raise LaunchFailed(error.message) from None
-
-    @property
-    def advice(self) -> str:
-        """One thing to do about messages of the test that do not arrive: the submission has to hear them."""
-        return next(filter(None, self._advices()), "")
-
-    def _advices(self) -> Iterator[str]:
-        for offer in self._offers.values():
-            same = [e for e in self._graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
-            fitting = [e for e in same if e.type == offer.type]
-            if not fitting:
-                yield explain_no_subscription(self.trace(), offer.topic, offer.type).hint
-            for unmet in filter(None, (unmet_policy(offer, end) for end in fitting)):
-                yield f"subscribe to {offer.topic} with {unmet[0]}"
-
-    def _silence(self, topic: str) -> NoMessage:
-        found = explain_no_message(self.trace(), topic, None)
-        return NoMessage(found.reason, found.hint)
-
-    def _no_server(self, service: str, interface: str) -> str:
-        node, _, name = service.rpartition("/")
-        if name in telling.OF_EVERY_NODE and node not in self._graph.nodes:
-            return super()._no_server(service, interface)
-        found = explain_no_server(self.trace(), service, interface)
-        return f"{found.reason}\n  hint: {found.hint}" if found.hint else found.reason
-
-    def _plan_of(self, found: Found, start: PlannedStart, env: Mapping[str, str]) -> Plan:
-        return replace(
-            self._plan,
-            processes=((start.process, found.file),),
-            host_seed=derive(int(self._job.plan.host_seed, 16), "program", start.process),
-            starts=(start,),
-            environment=tuple((name, str(value)) for name, value in env.items()),
-        )
-
-    def _as_object(self, message: Message) -> Any:
-        """Return a message from the fields that the worker has read: its bytes are the student's."""
-        kind = message_class(message.type)
-        if kind is None:
-            raise NoMessage(f"{message.topic} has messages of type {message.type}, which is not installed here")
-        if not message.value and kind.get_fields_and_field_types():
-            raise NoMessage(f"{message.topic} has a message that is too large to be read")
-        return built(kind, message.value, message.topic)
 
 
 class Plugin:
@@ -253,7 +110,7 @@ class Plugin:
         items[:] = [item for item in items if _name(item) in self._jobs]
 
     @pytest.fixture
-    def ros(self, request: pytest.FixtureRequest) -> Iterator[GradedWorld]:
+    def ros(self, request: pytest.FixtureRequest) -> Iterator[World]:
         """The world in which a test runs the programs of a submission."""
         node: Any = request.node
         options: dict[str, Any] = {}
@@ -263,7 +120,7 @@ class Plugin:
                 found = unknown[0] if unknown else repr(marker.args[0])
                 raise ValueError(f"@pytest.mark.ros in a rubric: expected {first_few(OPTIONS)} by name, found {found}")
             options |= marker.kwargs
-        world = GradedWorld(self._line, self._jobs[_name(node)], options)
+        world = graded_world(self._line, self._jobs[_name(node)], options)
         node.stash[_WORLD] = world
         yield world
         world.close()
@@ -319,7 +176,7 @@ def _found_by(item: pytest.Item, when: str, failure: pytest.ExceptionInfo[BaseEx
     return {"tested": {"passed": False, "reason": _said(error, failure), "hint": advice}}
 
 
-def _of_programs(error: BaseException, world: GradedWorld | None) -> dict[str, Any] | None:
+def _of_programs(error: BaseException, world: World | None) -> dict[str, Any] | None:
     """Return what programs did that ended a test, in whichever part of it; None if it was no program."""
     if world is not None and world.full:
         return {"reason": world.full}

@@ -9,10 +9,33 @@ from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import EnvironmentFault
+from grader.runtime.model.limits import Limits
+from grader.runtime.model.quantities import GIB, MIB, NS_PER_S
+from grader.runtime.model.trace import ClockKind
+from grader.runtime.plan import Plan, derive
 from grader.runtime.session import OWN_PROGRAMS, RecordingSession, open_session, runs_a_test
-from grader.world.faults import ALL, RunDraws
+from grader.world.faults import ALL, RunDraws, faults_of_run
 from grader.world.measuring import measured_lines
-from grader.world.world import World
+from grader.world.own_programs import OwnPrograms, modules_near
+from grader.world.world import World, WorldSetting
+
+#: How much the programs of a test may use, and how much of it is kept: they are trusted, so these are only to end what
+#: runs away. Images of some megabytes have to fit.
+OWN_LIMITS = Limits(
+    memory_bytes=16 * GIB,
+    processor_ns=3600 * NS_PER_S,
+    processes=4096,
+    output_bytes=64 * MIB,
+    lines=1_000_000,
+    open_files=4096,
+    file_bytes=64 * GIB,
+    scratch_bytes=64 * GIB,
+    wall_ns=24 * 3600 * NS_PER_S,
+    messages=1_000_000,
+    message_bytes=64 * MIB,
+    traffic_bytes=1 * GIB,
+    participants=200,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,28 +90,43 @@ class Worlds:
             swarm: Whether the seed also draws which of these faults are on.
             only: What is drawn at all, of all that the seed draws.
         """
+        time, drawn = clock_named(clock), seed or 0
         folders = tuple(dict.fromkeys(path.resolve() for path in (near, self.folder, Path()) if path is not None))
-        world = World(
-            self.session,
-            folders,
-            clock=clock,
-            seed=seed or 0,
-            name=name,
-            drawn_order=seed is not None,
-            swarm=swarm,
-            only=only,
-            delay=delay,
-            lose=lose,
-            between=between,
+        faults = faults_of_run(drawn, delay=delay, lose=lose, between=between, swarm=swarm, only=only)
+        plan = Plan(
+            scenario=name,
+            processes=(),
+            root="/",
+            host_seed=derive(drawn, "world"),
+            duration_ns=0,
+            first_message_on="",
+            wait_at_most_ns=0,
+            clock=time.value,
+            limits=OWN_LIMITS,
+            drawn_order=seed is not None and time is not ClockKind.WALL,
+            working=str(Path.cwd()),
+            interfaces=modules_near(folders[:1]),
             measured=self.measured,
             debugger=self.debugger,
+            connections=faults.connections,
+            faults=faults.injected,
+            drawn_steps=only.steps,
         )
+        setting = WorldSetting(self.session, OwnPrograms(self.session, folders, drawn), folders)
+        world = World(setting, plan, drawn, faults.names)
         world.updates_recordings = self.updates_recordings
         try:
             yield world
             world.finish()
         finally:
             world.close()
+
+
+def clock_named(name: str) -> ClockKind:
+    """Return the clock of a name; raises ValueError if there is none."""
+    if name not in [kind.value for kind in ClockKind]:
+        raise ValueError(f"clock: expected virtual or wall, found {name!r}")
+    return ClockKind(name)
 
 
 @contextmanager

@@ -365,12 +365,22 @@ def test_field(ros):
 
 
 @pytest.mark.points(1)
+def test_keeps(ros):
+    ros.keep("run")
+
+
+@pytest.mark.points(1)
+def test_compares(ros):
+    ros.record("speed.jsonl")
+
+
+@pytest.mark.points(1)
 def test_right(ros):
     ros.run("obstacle_stop.py")
 """
 SAID = {
     "test_wrong_value": "test_robot.py:15: AssertionError: The 'linear' field must be a sub message",
-    "test_typo": "test_robot.py:20: AttributeError: 'GradedWorld' object has no attribute 'advanc'",
+    "test_typo": "test_robot.py:20: AttributeError: 'World' object has no attribute 'advanc'",
     "test_fixture": "test_robot.py:10: in a fixture (setup): AssertionError",
     "test_unknown_fixture": "in a fixture (setup): FixtureLookupError",
     "test_unknown_program": "test_robot.py:35: SubmissionError: obstacle_stpo.py: expected a program of the rubric, "
@@ -380,6 +390,8 @@ SAID = {
     "test_other_world": "a test of a rubric runs programs in no world of its own",
     "test_option": "@pytest.mark.ros in a rubric: expected seed, delay, lose by name, found order",
     "test_imports_the_program": "test_robot.py:64: ModuleNotFoundError: No module named 'obstacle_stop'",
+    "test_keeps": "ValueError: keep: expected a test of your own programs: grade keeps what a rubric's tests record",
+    "test_compares": "ValueError: record: expected a test of your own programs: a rubric has no recordings to compare",
     "test_field": "name the type that the messages have to be of, as in ros.messages(topic, Twist)",
 }
 

@@ -6,6 +6,7 @@ import select
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from geometry_msgs.msg import Twist
@@ -479,8 +480,8 @@ def hears(ros: World) -> bool:
 
 def kill_worker(ros: World) -> None:
     """Kill the worker of a world, with all that it has started, and wait until its end can be seen."""
-    worker = ros._run._worker
-    os.killpg(worker._process.pid, signal.SIGKILL)  # type: ignore[attr-defined]
+    worker: Any = ros._run._worker
+    os.killpg(worker._process.pid, signal.SIGKILL)
     select.select([worker._line], [], [])
 
 

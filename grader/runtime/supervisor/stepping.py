@@ -3,25 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple, Protocol
 
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.trace import Observation
 from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import to_json
 from grader.runtime.steps import Command, Finish, LaunchFailedError
-from grader.runtime.supervisor.supervisor import TRIES, Recorder, WorkerLostError, WorkerProcess
+from grader.runtime.supervisor.supervisor import TRIES, Recorder, WorkerLostError
 
 #: Answers a question of the worker, while virtual time stands still.
 Answer = Callable[[Mapping[str, Any]], Any]
 
 
+class SteppedWorker(Protocol):
+    """What a run is stepped in: a worker that has begun it, or a line to one."""
+
+    def exchange(self, told: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Tell the worker something, and return what it says next; None only listens."""
+
+
+class GiveBack(Protocol):
+    """Gives back a worker that was lent."""
+
+    def __call__(self, *, usable: bool) -> None:
+        """Give it back; if it is not usable, it is ended."""
+
+
+class LentWorker(NamedTuple):
+    """A worker that has begun a run, and what gives it back when the run has ended."""
+
+    worker: SteppedWorker
+    give_back: GiveBack
+
+
+def lend_stepped(recorder: Recorder, plan: Plan) -> LentWorker:
+    """Return a worker of a recorder that has begun a run; one that has died while it was idle is replaced.
+
+    Raises:
+        HarnessError: No worker can be started.
+    """
+    for left in reversed(range(TRIES)):
+        worker = recorder.lend()
+        try:
+            worker.step(plan)
+            break
+        except BaseException as error:
+            recorder.take_back(worker, usable=False)
+            if not (isinstance(error, WorkerLostError) and left):
+                raise
+    return LentWorker(worker, partial(recorder.take_back, worker))
+
+
 class SteppedRun:
-    """One run in a worker of a recorder; nobody else uses that worker before the run has ended.
+    """One run in a worker; nobody else uses that worker before the run has ended.
 
     Args:
-        recorder: Lends the worker.
-        plan: Limits, seed and clock of the run.
+        lent: The worker, which has begun the run.
         answer: Answers questions of the worker. What it raises is raised by the command that led to the question.
 
     Attributes:
@@ -30,13 +69,10 @@ class SteppedRun:
         full: The limit that ended the recording, as a sentence; empty if none did.
         notes: Sentences for whoever reads the recording; known once the run has ended.
         unsuitable: Why virtual time does not suit the nodes; known once the run has ended, empty if it does.
-
-    Raises:
-        HarnessError: No worker can be started.
     """
 
-    def __init__(self, recorder: Recorder, plan: Plan, answer: Answer) -> None:
-        self._recorder = recorder
+    def __init__(self, lent: LentWorker, answer: Answer) -> None:
+        self._worker, self._give_back = lent
         self._answer = answer
         self._observations: list[Observation] = []
         self._raised: BaseException | None = None
@@ -45,19 +81,6 @@ class SteppedRun:
         self.ended: dict[str, int | None] = {}
         self.full = self.unsuitable = ""
         self.notes: list[str] = []
-        self._worker = self._lent(plan, TRIES)
-
-    def _lent(self, plan: Plan, tries: int) -> WorkerProcess:
-        """Return a worker that has begun the run; one that has died while it was idle is replaced."""
-        worker = self._recorder.lend()
-        try:
-            worker.step(plan)
-        except BaseException as error:
-            self._recorder.take_back(worker, usable=False)
-            if isinstance(error, WorkerLostError) and tries > 1:
-                return self._lent(plan, tries - 1)
-            raise
-        return worker
 
     @property
     def is_busy(self) -> bool:
@@ -112,7 +135,7 @@ class SteppedRun:
         try:
             usable = self._worker.exchange(None).get("worn") is False
         finally:
-            self._recorder.take_back(self._worker, usable=usable)
+            self._give_back(usable=usable)
         return observations
 
     def _answered(self, question: Mapping[str, Any]) -> Any:
@@ -133,4 +156,4 @@ class SteppedRun:
 
     def _give_up(self) -> None:
         self._closed = True
-        self._recorder.take_back(self._worker, usable=False)
+        self._give_back(usable=False)
