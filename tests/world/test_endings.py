@@ -90,6 +90,21 @@ def test_who_says_farewell_leaves_at_once_and_who_does_not_by_the_lease(
         assert [(log.t_ns / 1e9, log.text) for log in watcher.logs] == [(1.0, THERE), (ended, GONE)], name
 
 
+def test_the_last_one_leaves_as_well(ros: World, write: Callable[[str, str], str]) -> None:
+    """Though nobody is left who could see it; one that is killed by its lease."""
+    first = ros.run(write("first", TICKER.format("pass")))
+    ros.advance(1.5)
+    first.interrupt()
+    assert (ros.nodes(), ros.graph().endpoints) == ([], ())
+    second = ros.run(write("second", TICKER.format("pass")))
+    ros.advance(1.5)
+    second.kill()
+    ros.advance(19.9)
+    assert ros.nodes() == ["/second"]
+    ros.advance(0.1)
+    assert (ros.nodes(), ros.graph().endpoints) == ([], ())
+
+
 def test_who_comes_after_the_end_never_hears_of_the_dead(ros: World, write: Callable[[str, str], str]) -> None:
     """And whoever was there counts both, until the lease of the first one ends."""
     ticker = write("ticker", TICKER.format("pass"))

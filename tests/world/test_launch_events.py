@@ -176,6 +176,7 @@ def test_a_shutdown_stops_all_nodes(ros_session: Worlds, folder: Path, what: str
         assert steady.exit_code == 0
         assert not any(program.running for program in ros.programs)
         assert len(ros.programs) <= 2
+        assert ros.nodes() == []
 
 
 def test_a_node_that_ignores_the_stop_signal_is_killed(ros_session: Worlds, folder: Path) -> None:

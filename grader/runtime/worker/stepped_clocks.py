@@ -55,6 +55,8 @@ class KillProgram(Event):
 class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
     """Carries out commands on the virtual clock, with the faults of the plan."""
 
+    goes_on = True
+
     def __init__(
         self, plan: Plan, students: list[NodeProcess], observer: Observer, start: Starter, ask: Question
     ) -> None:
