@@ -22,7 +22,9 @@ setup(name="rover", version="0.0.0", packages=["rover"], data_files=[
 """
 NODE = """import rclpy
 from geometry_msgs.msg import Twist
+from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -84,6 +86,27 @@ ASKED_TOO_EARLY = {
         self.out.publish(String(data="localized"))
 """,
 }
+#: The mover reads its parameter once, two tenths of a second after the configurator has set it.
+READ_TOO_EARLY = {
+    "configurator": """
+        self.client = self.create_client(SetParameters, "/mover/set_parameters")
+        self.timer = self.create_timer(0.5, self.configure)
+
+    def configure(self):
+        self.timer.cancel()
+        speed = Parameter("speed", value=0.5).to_parameter_msg()
+        self.client.call_async(SetParameters.Request(parameters=[speed]))
+""",
+    "mover": """
+        self.declare_parameter("speed", 0.1)
+        self.out = self.create_publisher(String, "/state", 10)
+        self.timer = self.create_timer(0.7, self.begin)
+
+    def begin(self):
+        self.timer.cancel()
+        self.out.publish(String(data=str(self.get_parameter("speed").value)))
+""",
+}
 BASE_RESTS = """
 import pytest
 
@@ -105,6 +128,22 @@ def test_it_is_localized(ros):
     ros.run("rover/localizer")
     ros.advance(2.0)
     assert [state.data for state in ros.messages("/state")] == ["localized"]
+"""
+
+
+CONFIGURED = """
+import pytest
+
+FAULTS = {
+    "rover/configurator": {"pause": (0.3, 1.0)}, "rover/mover": {"pause": (0.0, 0.1)}, "/state": {"delay": (0.0, 0.1)}
+}
+
+@pytest.mark.ros(seeds=12, between=FAULTS)
+def test_it_has_the_speed_that_was_set(ros):
+    ros.run("rover/configurator")
+    ros.run("rover/mover")
+    ros.advance(2.0)
+    assert [state.data for state in ros.messages("/state")] == ["0.5"]
 """
 
 
@@ -148,8 +187,19 @@ def told_of(result: pytest.RunResult) -> list[str]:
             r"/map_server offered /map; in the nearest run that passes, /map_server offered /map first",
             r"of \d+ draws it takes 1 to fail: pause rover/map_server \(\d+ runs\)",
         ),
+        (
+            READ_TOO_EARLY,
+            CONFIGURED,
+            r"race: /configurator was paused for [\d.]+ s, and at t = 0\.700 s /mover published /state before "
+            r"/configurator called /mover/set_parameters; in the nearest run that passes it was the other way round",
+            r"of \d+ draws it takes 1 to fail: pause rover/configurator \(\d+ runs\)",
+        ),
     ],
-    ids=["two publishers whose order matters", "a service asked before it is there"],
+    ids=[
+        "two publishers whose order matters",
+        "a service asked before it is there",
+        "a parameter read before it is set",
+    ],
 )
 def test_a_race_is_found_shrunk_explained_and_repeated(
     pytester: pytest.Pytester, nodes: dict[str, str], test: str, sentence: str, needed: str
@@ -215,3 +265,38 @@ def test_faults_between_programs(ros_session: Worlds, tmp_path: Path) -> None:
     killed = tracked(ros_session, folder, {"rover/camera": {"kill": (0.35, 0.75)}}, 3)
     assert killed == every[: len(killed)]
     assert 3 <= len(killed) <= 7
+
+
+#: Each process of pytest writes down which tests it has collected, in their order.
+CONFTEST = """
+from pathlib import Path
+
+def pytest_collection_finish(session):
+    process = getattr(session.config, "workerinput", {}).get("workerid", "alone")
+    Path(f"{process}.txt").write_text(" ".join(item.name for item in session.items))
+"""
+FAILS_WITH_FIVE = """
+import pytest
+
+@pytest.mark.ros(seeds=7)
+def test_it(ros):
+    assert ros.seed != 5
+"""
+
+
+def test_seeds_are_kept_with_xdist(pytester: pytest.Pytester) -> None:
+    """The one that failed is stored by the process that shares the tests out, and is the first one of each of them."""
+    pytester.makeconftest(CONFTEST)
+    pytester.makepyfile(FAILS_WITH_FIVE)
+    run = ("-p", "grader.pytest_plugin", "-p", "xdist", "--ros-no-shrink")
+    pytester.runpytest_subprocess(*run, "-n", "2").assert_outcomes(passed=6, failed=1)
+    for options, processes in ((("-n", "2"), ("gw0", "gw1")), (("-n", "0"), ("alone",))):
+        pytester.runpytest_subprocess(*run, *options).assert_outcomes(passed=6, failed=1)
+        for process in processes:
+            first, *others = (pytester.path / f"{process}.txt").read_text().split()
+            assert first == "test_it[seed5]"
+            assert others == [f"test_it[seed{seed}]" for seed in range(7) if seed != 5]
+    pytester.makepyfile(FAILS_WITH_FIVE.replace("!= 5", ">= 0"))
+    pytester.runpytest_subprocess(*run, "-n", "2").assert_outcomes(passed=7)
+    pytester.runpytest_subprocess(*run, "-n", "2").assert_outcomes(passed=7)
+    assert (pytester.path / "gw0.txt").read_text().split()[0] == "test_it[seed0]"
