@@ -26,7 +26,14 @@ from grader.grading.submissions.archives import (
     unpacked,
     zip_members,
 )
-from grader.grading.submissions.collected import USUAL, collision, is_skipped, name_problem, why_skipped
+from grader.grading.submissions.collected import (
+    USUAL,
+    SubmissionLimits,
+    collision,
+    is_skipped,
+    name_problem,
+    why_skipped,
+)
 from grader.runtime.files import write_whole
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError
@@ -187,14 +194,17 @@ class Unpacked:
     strays: list[str] = field(default_factory=list)  # entries that belong to no submission, with the reason
 
 
-def unpack_download(archive: Path, into: Path) -> Unpacked:
+def unpack_download(archive: Path, into: Path, limits: SubmissionLimits = USUAL) -> Unpacked:
     """Unpack a zip or tar file into a folder of the grader, unless it was unpacked before; a note is kept beside it.
+
+    The limits are those of each submission in it.
 
     Raises ClassError if the archive cannot be read, HarnessError if the copy cannot be written.
     """
     data = _read(archive)
     note = into.with_name(f".{into.name}.json")
-    digest = hashlib.sha256(data).hexdigest()
+    # Of a rubric that asks for recordings, more is unpacked.
+    digest = f"{hashlib.sha256(data).hexdigest()} {limits.bag_bytes}"
     known = _known(note, digest, into) if into.is_dir() else None
     if known is not None:
         return known
@@ -203,7 +213,7 @@ def unpack_download(archive: Path, into: Path) -> Unpacked:
         for unfinished in into.parent.glob(f".{into.name}.*.tmp"):
             shutil.rmtree(unfinished, ignore_errors=True)
         fresh = into.with_name(f".{into.name}.{secrets.token_hex(4)}.tmp")
-        found = _unpack(_members(archive, data), fresh)
+        found = _unpack(_members(archive, data), fresh, limits)
         note.unlink(missing_ok=True)
         shutil.rmtree(into, ignore_errors=True)
         fresh.rename(into)
@@ -252,7 +262,7 @@ def _members(archive: Path, data: bytes) -> list[Member]:
         raise ClassError(f"{archive}: {error.problem}", "download it again, or name the unpacked folder") from None
 
 
-def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
+def _unpack(members: Iterable[Member], into: Path, limits: SubmissionLimits) -> Unpacked:
     """Write the acceptable entries; each student's part completely or not at all."""
     named = [(member.name.removeprefix("./"), member) for member in members]
     around = _around(name for name, member in named if member.kind == FILE)
@@ -275,7 +285,7 @@ def _unpack(members: Iterable[Member], into: Path) -> Unpacked:
     found.strays += [f"{printable(part)}: {why}, so it is not graded" for part, why in overlooked.items()]
     left = MAX_UNPACKED_BYTES
     for part, inside in by_part.items():
-        problem, size = _write_part(inside, top, left)
+        problem, size = _write_part(inside, top, left, limits)
         left -= size
         if problem:
             found.refused[part] = problem
@@ -303,7 +313,7 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tuple[str, int]:
+def _write_part(inside: list[tuple[str, Member]], into: Path, left: int, limits: SubmissionLimits) -> tuple[str, int]:
     """Write the files of one student; return the problem, empty if there is none, and the number of bytes read."""
     problem = _name_problem(inside)
     if problem:
@@ -315,7 +325,7 @@ def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tupl
             continue
         # As in a folder that is graded by itself: there a larger file is left out with a note.
         is_whole = "/" not in name and name.casefold().endswith(ARCHIVE_SUFFIXES)
-        most = MAX_ARCHIVE_BYTES if is_whole else USUAL.file_bytes
+        most = limits.packed_bytes if is_whole else limits.most_of(name)
         try:
             content = member.read(most + 1) if member.size <= most else None
         except UnusableArchiveError as error:
@@ -324,8 +334,9 @@ def _write_part(inside: list[tuple[str, Member]], into: Path, left: int) -> tupl
             write_without_content(into / name, most)
             continue
         total += len(content)
-        if total > min(MAX_PART_BYTES, left):
-            limit = min(MAX_PART_BYTES, left) >> 20
+        whole = min(MAX_PART_BYTES + limits.bag_bytes, left)
+        if total > whole:
+            limit = whole >> 20
             return f"expected at most {limit} MiB in all, found more with {printable(name)}", total
         (into / name).parent.mkdir(parents=True, exist_ok=True)
         (into / name).write_bytes(content)

@@ -12,6 +12,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field
+from functools import partial
 from pathlib import Path
 
 from grader.course.classroom.downloads import (
@@ -29,15 +30,16 @@ from grader.course.classroom.downloads import (
 from grader.grading.submissions.archives import ARCHIVE_SUFFIXES
 from grader.grading.submissions.collected import (
     USUAL,
+    SubmissionLimits,
     is_skipped_file,
     is_skipped_folder,
+    limits_for,
     name_problem,
     why_skipped,
 )
 from grader.grading.submissions.submission import read_start
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import ClassError, HarnessError, SubmissionError
-from grader.runtime.model.limits import MAX_ARCHIVE_BYTES
 from grader.runtime.model.wording import printable
 
 #: Longest name, in bytes of UTF-8, not counting the suffix that makes it unique.
@@ -137,7 +139,7 @@ def take_in(
     sources = list(_each_once(sources, strays))
     called = distinct_names([(source.resolve().name, str(source)) for source in sources])
     for source, own in zip(sources, called, strict=True):
-        top, refused = _opened(source, results / "unpacked" / own, strays)
+        top, refused = _opened(source, results / "unpacked" / own, strays, limits_for(wanted))
         children = [child for child in _children(top, strays) if child.resolve() != results.resolve()]
         used = _layout(children, top, layout, pattern)
         here = _submissions(children, own, used, strays)
@@ -192,13 +194,13 @@ def _is_same(source: Path, other: Path) -> bool:
         return False
 
 
-def _opened(source: Path, into: Path, strays: list[str]) -> tuple[Path, Mapping[str, str]]:
+def _opened(source: Path, into: Path, strays: list[str], limits: SubmissionLimits) -> tuple[Path, Mapping[str, str]]:
     """Return the folder with the submissions of a source, and the entries that were refused."""
     if source.is_dir():
         return source, {}
     if not source.is_file():
         raise ClassError(f"{source}: expected a folder of submissions or a download, found nothing there")
-    unpacked = unpack_download(source, into)
+    unpacked = unpack_download(source, into, limits)
     strays += [f"{source}: {stray}" for stray in unpacked.strays]
     return unpacked.folder, unpacked.refused
 
@@ -295,19 +297,20 @@ def _put_together(one: _Found, into: Path, wanted: Collection[str], strays: list
     Returns what is graded, which is a single archive itself, and the problem, if any.
     """
     given = one.layout.original_names([name for name, _ in one.files], wanted)
+    copy = partial(_copy, limits=limits_for(wanted))
     try:
         shutil.rmtree(into, ignore_errors=True)
         into.mkdir(parents=True)
         for names, (_, path) in zip(given, one.files, strict=True):
             if path.is_dir():
-                shutil.copytree(path, into, symlinks=True, dirs_exist_ok=True, copy_function=_copy)
+                shutil.copytree(path, into, symlinks=True, dirs_exist_ok=True, copy_function=copy)
             for name in names if not path.is_dir() else ():
                 wrong = name_problem(name)
                 if wrong:
                     strays.append(f"{printable(str(path), 200)}: {wrong}, so it is left out of its submission")
                 else:
                     (into / name).parent.mkdir(parents=True, exist_ok=True)
-                    _copy(str(path), str(into / name))
+                    copy(str(path), str(into / name))
         only = next(iter(into.iterdir()), into) if len(one.files) == 1 else into
         return only if _is_archive(only) else into, ""
     except SubmissionError as error:
@@ -318,14 +321,14 @@ def _put_together(one: _Found, into: Path, wanted: Collection[str], strays: list
         raise HarnessError(f"{into}: the submission cannot be copied: {error.strerror}", "free some space") from None
 
 
-def _copy(source: str, target: str) -> str:
+def _copy(source: str, target: str, limits: SubmissionLimits = USUAL) -> str:
     """Copy a file of a student, without the content of one that is too large to be graded.
 
     Of two files of one name, a different program is a SubmissionError; of any other kind, both are kept.
     """
     path, wish = Path(source), Path(target)
     size = path.stat().st_size
-    most = MAX_ARCHIVE_BYTES if _is_archive(path) else USUAL.file_bytes
+    most = limits.packed_bytes if _is_archive(path) else limits.most_of(path.name)
     content = read_start(path, most, where=printable(source, 200)) if size <= most else None
     same = content is not None and wish.is_file() and wish.read_bytes() == content
     if wish.exists() and not same:

@@ -155,13 +155,35 @@ def _prepared(path: Path, options: SelftestOptions) -> tuple[Path, Exercise, Exp
     path = rubric_file(path)
     (exercise,) = read_exercises(GradeRequest("", rubrics=(path,)))
     known = read_explained(notes_on(path), exercise)
+    exercise, left_out = _without_recordings(path, exercise)
     explained = replace(
-        known, reference=options.reference or known.reference, template=options.template or known.template
+        known,
+        reference=options.reference or known.reference,
+        template=options.template or known.template,
+        criteria={**known.criteria, **left_out},
     )
     if explained.reference is None:
         hint = f"name it with --reference FOLDER, or as `reference:` in {notes_on(path).name}"
         raise RubricError(f"{path}: expected a reference solution to test it with, found none", hint)
     return path, exercise, explained
+
+
+def _without_recordings(path: Path, exercise: Exercise) -> tuple[Exercise, Mapping[str, str]]:
+    """Return an exercise without what recordings of students decide, and why the criteria about these are left out.
+
+    Raises RubricError if nothing else is left.
+    """
+    bags = {scenario.id for scenario in exercise.scenarios if scenario.handed_in is not None}
+    kept = [criterion for criterion in exercise.criteria if criterion.scenario not in bags]
+    if not kept:
+        text = "expected a criterion about a program, found only some about recordings that students hand in"
+        raise RubricError(f"{path}: {text}", "no program can be changed to test these: grade a few recordings instead")
+    names = {criterion.id for criterion in kept}
+    criteria = tuple(replace(one, needs=tuple(need for need in one.needs if need in names)) for one in kept)
+    scenarios = tuple(scenario for scenario in exercise.scenarios if scenario.id not in bags)
+    why = "a recording that students hand in decides it, and no change of a program alters that"
+    left_out = {criterion.id: why for criterion in exercise.criteria if criterion.id not in names}
+    return replace(exercise, criteria=criteria, scenarios=scenarios), left_out
 
 
 def _bench(  # noqa: PLR0913  each comes from a different stage

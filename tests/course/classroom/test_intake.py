@@ -528,3 +528,24 @@ def test_a_name_that_is_no_text_is_safe(tmp_path: Path) -> None:
     found_names = names(found(tmp_path, class_))
     assert len(set(found_names)) == 5
     assert all(name.isprintable() and len(name.encode()) <= 90 and "/" not in name for name in found_names)
+
+
+def test_recordings_are_unpacked_where_a_rubric_asks_for_one(tmp_path: Path) -> None:
+    """Also from a download that an earlier run has unpacked without them."""
+    archive = tmp_path / "all.zip"
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_STORED) as packed:
+        for name in ("ada", "bob"):
+            packed.writestr(f"{name}/run.mcap", b"x" * (9 << 20))
+    for wanted, whole in ((("a.py",), False), (("*.mcap",), True)):
+        entries = take_in([archive], tmp_path / "out", wanted=wanted).entries
+        assert [(e.path / "run.mcap").read_bytes()[:1] == b"x" for e in entries] == [whole, whole]
+
+
+def test_so_are_recordings_among_the_files_of_a_student(tmp_path: Path) -> None:
+    """A platform that stores single files gives them the student's name."""
+    class_ = tmp_path / "submissions"
+    class_.mkdir()
+    (class_ / "adalovelace_7_11_node.py").write_text("x = 1\n")
+    (class_ / "adalovelace_7_12_run.mcap").write_bytes(b"x" * (9 << 20))
+    (entry,) = take_in([class_], tmp_path / "out", layout="canvas", wanted=("node.py", "*.mcap")).entries
+    assert (entry.path / "run.mcap").stat().st_size == 9 << 20

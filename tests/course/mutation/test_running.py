@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from grader.cli.main import app
 from grader.course.mutation.operators.program import Candidate
-from grader.course.mutation.running import SelftestOptions, _sampled, _sources, selftest
+from grader.course.mutation.running import SelftestOptions, _sampled, _sources, _without_recordings, selftest
 from grader.grading.rubrics.builtin import builtin_rubrics
 from grader.grading.rubrics.loader import read_rubric
 from grader.grading.submissions.submission import stage_submission
@@ -139,3 +139,34 @@ def test_a_hole_in_a_rubric_is_found(tmp_path: Path) -> None:
         ("survived", "self.create_timer((1 / RATE_HZ) * 10, self.send)"),
     ]
     assert (code, tested["passed"], tested["template"]) == (1, False, None)
+
+
+BAGS = """\
+schema: grader/rubric/v1
+exercise: {id: square, number: 1, title: A square}
+FILES
+scenarios:
+  - {id: drive, handed_in: {bag: "*.mcap"}}
+SCENARIOS
+criteria:
+  - {id: odom, title: O, points: 5, scenario: drive, check: {publishes: {topic: /a, type: std_msgs/msg/String}}}
+"""
+RUNS = "  - {id: speed, title: S, points: 5, scenario: alone, needs: [odom], check: {no_fault: {process: a.py}}}\n"
+
+
+def test_what_recordings_of_students_decide_is_left_out_with_the_reason(tmp_path: Path) -> None:
+    path = tmp_path / "r.yaml"
+    alone = "  - {id: alone, processes: [a.py], observe: {duration: 1 s}}"
+    path.write_text(BAGS.replace("FILES", "files: [a.py]").replace("SCENARIOS", alone) + RUNS)
+    exercise, left_out = _without_recordings(path, read_rubric(path))
+    assert [(criterion.id, criterion.needs) for criterion in exercise.criteria] == [("speed", ())]
+    assert [scenario.id for scenario in exercise.scenarios] == ["alone"]
+    assert left_out == {"odom": "a recording that students hand in decides it, and no change of a program alters that"}
+
+
+def test_a_rubric_of_recordings_alone_has_nothing_to_test(tmp_path: Path) -> None:
+    path = tmp_path / "r.yaml"
+    path.write_text(BAGS.replace("FILES\n", "").replace("SCENARIOS\n", ""))
+    with pytest.raises(RubricError, match="found only some about recordings that students hand in") as refused:
+        next(selftest([path], SelftestOptions(), lambda step: None))
+    assert refused.value.hint == "no program can be changed to test these: grade a few recordings instead"
