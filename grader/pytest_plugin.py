@@ -321,7 +321,8 @@ def pytest_runtest_makereport(
         del item.stash[_WORLD]  # the fixture has nothing to add
         repeating = "repeat it with" if world.repeats else "the same delays and losses are drawn with"
         drawn = [f"seed {world.seed}: {repeating} --ros-seed {world.seed}"] if world.is_drawn else []
-        lines = [*item.stash.get(pytest_races.TOLD, []), *drawn, *world.remarks, *_kept(item, world, call.excinfo)]
+        kept = list(_kept(item, world, call.excinfo))  # closes the world, which then has all of its remarks
+        lines = [*item.stash.get(pytest_races.TOLD, []), *drawn, *world.remarks, *kept]
         report.sections.append(("ros", "\n".join(lines)))
         item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
     return report

@@ -710,8 +710,12 @@ class World:
 
     @property
     def remarks(self) -> list[str]:
-        """Sentences about what the test has asked for in vain: parts of launch files, parameters and remappings."""
-        return self._programs.remarks()
+        """Sentences about what the test has asked for in vain, and, once the world is closed, about how programs ran.
+
+        In vain are parts of launch files, parameters and remappings that have no effect. A program may have run as it
+        would not with `ros2 run`, which does not find a module beside it by its plain name.
+        """
+        return list(dict.fromkeys((*self._programs.remarks(), *self._run.notes)))
 
     @property
     def full(self) -> str:

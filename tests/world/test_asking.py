@@ -264,3 +264,46 @@ def test_a_launch_file_that_fails_is_told_with_its_line(ros_session: Worlds, tmp
         with pytest.raises(SubmissionError, match="expected a launch file"):
             ros.launch("node.py")
         assert ros.run("node.py").output == "here\n"
+
+
+def test_a_library_of_another_package_is_imported_from_its_sources(ros_session: Worlds, workspace: Path) -> None:
+    """As after a build, so that no package of Python in a workspace has to be built for a test."""
+    library = workspace.parents[1] / "speech"
+    (library / "speech").mkdir(parents=True)
+    manifest = (workspace.parent / "package.xml").read_text(encoding="utf-8")
+    (library / "package.xml").write_text(manifest.replace("<name>robot<", "<name>speech<"), encoding="utf-8")
+    (library / "setup.py").write_text("from setuptools import setup\nsetup(name='speech', packages=['speech'])\n")
+    (library / "speech/__init__.py").write_text("")
+    (library / "speech/words.py").write_text("def word(count):\n    return f'spoken {count}'\n")
+    nodes = workspace.parent / "robot/nodes.py"
+    written = nodes.read_text(encoding="utf-8")
+    nodes.write_text(written.replace("from robot.words", "from speech.words"), encoding="utf-8")
+    with ros_session.open(workspace) as ros:
+        ros.run("robot/talker")
+        ros.advance(1.0)
+        assert ros.messages("/chatter")[-1].data == "none spoken 1"
+    assert ros.remarks == []
+
+
+def test_a_path_among_the_arguments_of_a_launch_file(
+    ros_session: Worlds, workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is relative to the working directory, as with `ros2 launch`."""
+    (workspace / "own.launch.py").write_text(
+        """
+from launch import LaunchDescription
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    return LaunchDescription([Node(package="robot", executable="talker", parameters=[LaunchConfiguration("own")])])
+""",
+        encoding="utf-8",
+    )
+    (workspace.parent / "config/own.yaml").write_text("/**:\n  ros__parameters:\n    prefix: own\n", encoding="utf-8")
+    monkeypatch.chdir(workspace.parent)
+    with ros_session.open(workspace) as ros:
+        ros.launch("own.launch.py", arguments={"own": "config/own.yaml"})
+        ros.advance(1.0)
+        assert ros.messages("/chatter")[-1].data.startswith("own ")

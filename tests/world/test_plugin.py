@@ -432,3 +432,51 @@ def generate_launch_description():
     failure, _, warning = result.stdout.str().partition("warnings summary")
     for text in (failure, warning):
         assert "the event handler OnProcessExit was left out: only lists of actions" in text
+
+
+BESIDE = """
+def test_that_passes(ros):
+    ros.run("talk/talker")
+    ros.advance(1.0)
+    assert ros.messages("/n")[-1].data == 3
+
+def test_that_fails(ros):
+    ros.run("talk/talker")
+    assert ros.messages("/n")[-1].data == 3
+"""
+
+PACKAGE = {
+    "package.xml": "<package format='3'><name>talk</name>"
+    "<export><build_type>ament_python</build_type></export></package>",
+    "setup.py": "from setuptools import setup\n"
+    "setup(name='talk', packages=['talk'], entry_points={'console_scripts': ['talker = talk.talker:main']})\n",
+    "talk/__init__.py": "",
+    "talk/numbers_of_it.py": "NUMBER = 3\n",
+    "talk/talker.py": """
+import rclpy
+from numbers_of_it import NUMBER
+from std_msgs.msg import Int32
+
+
+def main():
+    rclpy.init()
+    node = rclpy.create_node("talker")
+    out = node.create_publisher(Int32, "n", 10)
+    node.create_timer(0.5, lambda: out.publish(Int32(data=NUMBER)))
+    rclpy.spin(node)
+""",
+}
+
+
+def test_an_import_that_fails_once_the_package_is_installed_is_told(pytester: pytest.Pytester) -> None:
+    """With the failure of a test, and as a warning of one that passes: `ros2 run` does not find the module."""
+    for name, text in PACKAGE.items():
+        path = pytester.path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    pytester.makepyfile(test_it=BESIDE)
+    result = pytester.runpytest_subprocess("-p", "grader.pytest_plugin", "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=1, failed=1, warnings=1)
+    told = "import numbers_of_it finds numbers_of_it.py beside it with `python3` only, not with `ros2 run`"
+    for text in result.stdout.str().split("warnings summary"):
+        assert told in text
