@@ -25,6 +25,7 @@ from grader.runtime.programs.executables import (
     find_executables,
     ignored_packages,
     package_of,
+    packages_near,
     project_folders,
     workspace_of,
 )
@@ -132,8 +133,7 @@ def _surroundings(folder: Path) -> tuple[Path, tuple[Project, ...]]:
 def _below(folder: Path) -> tuple[Path, tuple[Project, ...]]:
     """Return a folder that is in no package, such as that of a workspace, with the packages below it."""
     in_package = (package_of(folder) / "package.xml").is_file()
-    near = any(any(folder.glob(f"{level}/package.xml")) for level in ("*", "*/*"))
-    is_workspace = not in_package and (near or bool(project_folders(folder / "src")))
+    is_workspace = not in_package and bool(packages_near(folder) or project_folders(folder / "src"))
     return folder, _projects(folder) if is_workspace else ()
 
 

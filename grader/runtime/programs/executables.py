@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
 import posixpath
 import re
@@ -211,9 +212,7 @@ def workspace_of(package: Path) -> Path:
     source = next((up for up in above if up.name == "src"), None)
     if source is not None:
         return source if any(folder != package for folder in project_folders(source)) else package
-    beside: dict[Path, set[str]] = {
-        up: {*_names_in(up, package, levels)} for up, levels in zip(above, _LEVELS, strict=False)
-    }
+    beside = {up: {package_name(one) for one in packages_near(up) if one != package} for up in above[:2]}
     cloned = next((up for up in above if _is_cloned(up)), None)
     if cloned is not None and cloned not in beside:
         beside[cloned] = {package_name(folder) for folder in project_folders(cloned) if folder != package}
@@ -222,14 +221,11 @@ def workspace_of(package: Path) -> Path:
     return nearest if beside.get(nearest) else package
 
 
-#: Where packages are looked for beside one: in the folder that it is in, and in the one above that.
-_LEVELS = (("*", "*/*"), ("*", "*/*"))
-
-
-def _names_in(folder: Path, package: Path, levels: Sequence[str]) -> Iterator[str]:
-    """Yield the names of the packages in a folder, but for one."""
-    for level in levels:
-        yield from (package_name(one.parent) for one in folder.glob(f"{level}/package.xml") if one.parent != package)
+def packages_near(folder: Path) -> list[Path]:
+    """Return the folders of the packages in a folder and in the folders in it."""
+    # Not `Path.glob`, which raises if a folder vanishes meanwhile, as do those that other runs of pytest tidy up.
+    found = (path for level in ("*", "*/*") for path in glob.iglob(f"{level}/package.xml", root_dir=folder))  # noqa: PTH207
+    return [(folder / path).parent for path in found]
 
 
 def _is_cloned(folder: Path) -> bool:

@@ -134,6 +134,22 @@ def test_a_package_that_names_no_other_has_those_beside_it(tmp_path: Path) -> No
     assert workspace_of(package) == tmp_path / "course" / "PYTHON"
 
 
+def test_a_folder_that_vanishes_meanwhile_holds_no_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such as those of earlier runs of pytest, which a later one tidies up while a package beside them is looked at."""
+    package = a_package(tmp_path / "course" / "PYTHON", "talk_py")
+    a_package(tmp_path / "course" / "PYTHON", "beside")
+    (tmp_path / "course" / "vanishing").mkdir()
+    real = os.scandir
+
+    def scan(folder: str | Path) -> object:
+        if str(folder).endswith("vanishing"):
+            raise FileNotFoundError(folder)
+        return real(folder)
+
+    monkeypatch.setattr(os, "scandir", scan)
+    assert workspace_of(package) == tmp_path / "course" / "PYTHON"
+
+
 def test_what_needed_packages_need_is_needed(tmp_path: Path) -> None:
     """Whichever of their files names it."""
     one = a_package(tmp_path, "one", "import two")
