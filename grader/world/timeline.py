@@ -43,7 +43,7 @@ class Participant(Protocol):
 
 
 class Timeline:
-    """The time of a run: the commands of a test are carried out in it one after the other.
+    """The time of a run: the commands of a test are carried out in it, in the order of its lines.
 
     Args:
         session: Lends the worker.

@@ -265,7 +265,7 @@ class _Checked:
         self._interfaces = interfaces
         self._stimuli = tuple(_stimuli(rubric))
         self._simulated = tuple(_simulated(rubric))
-        #: A recording may bring the definitions of its types, so an unknown type in a check of one is no mistake.
+        #: A recording may bring the definitions of its types, so an unknown type in a check of one is right.
         self._checks = tuple(
             (path, check) for path, check, of_bag in _checks(rubric) if not (of_bag and _is_unknown(check, interfaces))
         )

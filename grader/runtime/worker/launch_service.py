@@ -16,7 +16,7 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Event
 
 #: How often all nodes of a launch file are started again at most. ROS has no limit, but there each start takes time; in
-#: virtual time, a node that fails at once would be started again for ever.
+#: virtual time, a node that fails at once would be started again without end.
 MOST_RESPAWNS = 100
 #: How long after the stop signal a node is killed that has not ended: launch sends SIGTERM after 5 s, which nodes of
 #: rclpy take for another Ctrl-C, and SIGKILL 5 s later.

@@ -116,7 +116,7 @@ def _waits_for_a_goal(case: Case) -> Clue | None:
 
 @hint_rule(*_CHECKS, fault=None, priority=3540)
 def _timer_never_ends(case: Case) -> Clue | None:
-    """A timer that a callback starts sends a goal again and again."""
+    """A timer that a callback starts sends a goal each time."""
     source = case.source
     if any(source.calls("cancel", "destroy_timer", "destroy", "reset")):
         return None

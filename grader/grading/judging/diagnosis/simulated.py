@@ -161,8 +161,8 @@ def _robot_waits(case: Case) -> Clue | None:
             periods += [number_in_code(source, m.period) or 0.0 for m in made(source, "timer")]
             if pause.seconds is not None and any(0 < period < pause.seconds for period in periods):
                 code = source.code(pause.call, 50)
-                hint = f"{code} holds up every callback for {number(pause.seconds)} s, and the robot goes on as it "
-                hint += "was told last: remove it"
+                hint = f"{code} holds up every callback for {number(pause.seconds)} s, and the robot keeps its last "
+                hint += "speed meanwhile: remove it"
                 return Clue(hint, source.place(pause.call), key=f"sleeps:{first_line(pause.call)}")
     return None
 
