@@ -24,7 +24,7 @@ def in_proportion(criterion: Criterion, finding: Finding) -> Finding:
     values = [reading.value for reading in readings]
     value = scale.combined(values)
     which = "" if len(values) == 1 else f" ({_words(scale)} of {len(values)})"
-    said = f"{measure.name} {measure.written(value)}{which}; {_limits(measure, scale)}"
+    said = f"{measure.name} {_written(measure, scale, value)}{which}; {_limits(measure, scale)}"
     evidence = dict(finding.evidence) | {MEASURED_KEY: _told(measure, scale, value, values)}
     reason = f"{finding.reason}; {said}" if finding.reason else said
     return replace(finding, credit=scale.share(value), reason=reason, brief=said, evidence=evidence, measured=value)
@@ -47,8 +47,8 @@ def over_draws(criterion: Criterion, findings: Sequence[Finding]) -> tuple[int, 
     # A draw without a number, such as one in which the program crashed, counts as `none`.
     values = [one.readings[0].value if one.readings else scale.none for one in findings]
     value = scale.combined(values)
-    each = first_few([measure.written(one) for one in values], 6)
-    said = f"{measure.name} {measure.written(value)}, {_words(scale)} of {total} draws ({each}); "
+    each = first_few([_written(measure, scale, one) for one in values], 6)
+    said = f"{measure.name} {_written(measure, scale, value)}, {_words(scale)} of {total} draws ({each}); "
     said += _limits(measure, scale)
     share = scale.share(value)
     evidence = dict(worst.evidence) | {MEASURED_KEY: _told(measure, scale, value, values)}
@@ -71,6 +71,14 @@ def measure_panel(measure: Measure, scale: Scale, finding: Finding) -> Panel | N
 def _words(scale: Scale) -> str:
     extreme = "the largest" if scale.less_is_better else "the smallest"
     return extreme if scale.combine == "worst" else f"the {scale.combine}"
+
+
+def _written(measure: Measure, scale: Scale, value: float) -> str:
+    """Return a combined number with its unit; one at `none` stands for all that are worse, which the words then say."""
+    written = measure.written(value)
+    if scale.share(value) > 0:
+        return written
+    return f"{written} or {'more' if scale.less_is_better else 'less'}"
 
 
 def _limits(measure: Measure, scale: Scale) -> str:

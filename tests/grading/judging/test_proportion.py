@@ -106,17 +106,18 @@ def test_without_limits_the_number_counts_for_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("combine", "score", "number"), [("worst", 0, 0.3), ("mean", Fraction(5), 0.2), ("median", 5, 0.2)]
+    ("combine", "score", "number"),
+    [("worst", 0, "0.3 m or more"), ("mean", Fraction(5), "0.2 m"), ("median", 5, "0.2 m")],
 )
-def test_draws_are_combined(combine: Any, score: int, number: float) -> None:
+def test_draws_are_combined(combine: Any, score: int, number: str) -> None:
     """The report names the worst of them, and shows its chart."""
     report, traces = judged(Scale(0.1, 0.3, combine), errors(0.1), errors(0.4), errors(0.2))
     (verdict,) = report.verdicts
     assert (verdict.score, verdict.recording) == (score, "run_draw_2")
     words = "the largest" if combine == "worst" else f"the {combine}"
     assert verdict.reason == (
-        f"error {number} m, {words} of 3 draws (0.1 m, 0.3 m, 0.2 m); full points for 0.1 m, none for 0.3 m; "
-        "draw 2 of 3: error 0.3 m; full points for 0.1 m, none for 0.3 m"
+        f"error {number}, {words} of 3 draws (0.1 m, 0.3 m or more, 0.2 m); full points for 0.1 m, none for 0.3 m; "
+        "draw 2 of 3: error 0.3 m or more; full points for 0.1 m, none for 0.3 m"
     )
     asked = on_recordings(exercise(Error(), Scale(0.1, 0.3, combine), 3), report.verdicts)
     charts = [f for f in figures_of(asked, traces) if isinstance(f, Chart)]
