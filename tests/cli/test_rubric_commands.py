@@ -59,6 +59,12 @@ def test_a_good_rubric_is_summed_up(tmp_path: Path) -> None:
     assert done.stdout == f"{path}: pump: 1 scenario, 1 criterion, 10 points\n"
 
 
+def test_a_scenario_with_draws_counts_once(tmp_path: Path) -> None:
+    """However often it is recorded."""
+    path = written(tmp_path, GOOD.replace("processes:", "draws: 3\n    processes:"))
+    assert rubric("check", path).stdout == f"{path}: pump: 1 scenario, 1 criterion, 10 points\n"
+
+
 def test_every_mistake_is_told_and_the_other_files_are_checked_too(tmp_path: Path) -> None:
     """Line and column of each, however many there are; exit code 2, and the good rubric is still summed up."""
     many = GOOD.replace("points: 10", "points: -1") + "".join(f"key{n}: 1\n" for n in range(20))

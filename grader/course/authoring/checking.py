@@ -217,7 +217,8 @@ def complaints(error: RubricError) -> list[str]:
 
 def _summary(exercise: Exercise) -> str:
     points = sum((criterion.points for criterion in exercise.criteria), Fraction(0))
-    parts = [_counted(len(exercise.scenarios), "scenario"), _counted(len(exercise.criteria), "criterion", "criteria")]
+    written = len(exercise.scenarios) - sum(map(len, exercise.draws.values()))  # without those that `draws` adds
+    parts = [_counted(written, "scenario"), _counted(len(exercise.criteria), "criterion", "criteria")]
     return f"{exercise.id}: {', '.join(parts)}, {float(points):g} {'point' if points == 1 else 'points'}"
 
 
