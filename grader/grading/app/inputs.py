@@ -97,6 +97,11 @@ def _read_simulation(text: str) -> NamedSimulation:
         raise GraderError(
             f"--simulation {printable(text)}: expected a file with simulations, found no {printable(file)}"
         )
+    if not colon and parameters.get("map"):
+        raise GraderError(
+            f"--simulation {printable(name)}: expected no `map`, because only a rubric brings maps",
+            "write walls as `boxes`, or grade with a rubric that lists the map under `maps`",
+        )
     return NamedSimulation(name, Path(file) if colon else None, parameters)
 
 

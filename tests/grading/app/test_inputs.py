@@ -102,6 +102,7 @@ def test_a_simulation_is_named_by_its_file_or_alone(desk: Path) -> None:
         ("sims/world.py:hal", "or `hall` in `simulation`, found `hal`"),
         ("sims/world.py:hall={wal: 1}", "or `wall` in `hall`, found `wal`"),
         ("turtle={x: far}", "expected a number"),
+        ("robot_in_map={map: room.yaml}", "robot_in_map: expected no `map`, because only a rubric brings maps"),
         ("sims/wrong.py:hall", "sims/wrong.py:1: expected a file that can be imported, found NameError"),
         ("sims/late.py:hall", "late.py:16: the simulation `hall` failed: ZeroDivisionError"),
     ],
