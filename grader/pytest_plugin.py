@@ -359,7 +359,8 @@ def _kept(item: Any, world: World, failure: pytest.ExceptionInfo[BaseException])
     try:
         situation = world.situation()
         world.close()
-        kept = world.keep(folder, why)
+        place = None if crash is None else (crash.path, crash.lineno)
+        kept = world.keep(folder, why, place)
         facts = {
             "test": item.nodeid,
             "error": {"type": failure.typename, "message": str(failure.value)},

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import linecache
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from grader.grading.app.grade import environment_of
-from grader.grading.judging.figures import playback
+from grader.grading.judging.figures import excerpt_around
+from grader.grading.judging.figures_of_test import played_test, shown_steps, value_charts
+from grader.grading.model.chart import Excerpt
+from grader.grading.model.exercise import Location
+from grader.grading.model.tested_run import SideOfTest
 from grader.grading.reporting.escape import json_value
 from grader.grading.reporting.html.render import render_run
 from grader.runtime.files import write_whole
@@ -18,14 +23,14 @@ from grader.runtime.recording.recording_file import recording_bytes
 from grader.runtime.serialization import carried_fields
 from grader.runtime.session import RecordingSession
 
-#: Who published on a topic, in the words of a test.
-SENDERS = {"grader": "test", "student": "program"}
 RECORDING, PAGE, FAILURE = "recording.mcap", "run.html", "failure.json"
 #: What `failure.json` is written in; `failure.schema.json` beside this module describes it.
 FORMAT = "grader/failed-test/v1"
 
 
-def keep(session: RecordingSession, trace: AssessedTrace, seed: int | None, folder: Path, why: str) -> list[Path]:
+def keep(  # noqa: PLR0913 - what a page shows
+    session: RecordingSession, trace: AssessedTrace, seed: int | None, folder: Path, why: str, test: SideOfTest
+) -> list[Path]:
     """Write the recording and the page of a run into a folder, and return their paths.
 
     Args:
@@ -34,6 +39,7 @@ def keep(session: RecordingSession, trace: AssessedTrace, seed: int | None, fold
         seed: What was drawn follows from it; None if nothing was.
         folder: Exists.
         why: Why the test failed, in one line; empty if it did not.
+        test: What the test itself did.
     """
     trace = _whole(trace)
     facts = {
@@ -42,7 +48,7 @@ def keep(session: RecordingSession, trace: AssessedTrace, seed: int | None, fold
         "environment": json.dumps(asdict(environment_of(session))),
     }
     recording, _ = recording_bytes(trace, facts, RECORDING)
-    page = page_of(session, trace, seed, why)
+    page = page_of(session, trace, seed, why, test)
     for name, data in ((RECORDING, recording), (PAGE, page.encode())):
         write_whole(folder / name, data)
     return [folder / RECORDING, folder / PAGE]
@@ -55,15 +61,35 @@ def keep_failure(folder: Path, facts: Mapping[str, Any]) -> Path:
     return folder / FAILURE
 
 
-def page_of(session: RecordingSession, trace: AssessedTrace, seed: int | None, why: str = "") -> str:
+def page_of(
+    session: RecordingSession, trace: AssessedTrace, seed: int | None, why: str = "", test: SideOfTest | None = None
+) -> str:
     """Return the page that plays a run, in one file; the arguments are those of `keep`."""
     environment = environment_of(session)
     facts = {} if seed is None else {"seed": str(seed)}
     facts |= {"ROS": f"rclpy {environment.rclpy} ({environment.ros_distro})", "Python": environment.python}
     processes = {o.process: None for o in trace.observations if isinstance(o, (LogRecord, OutputLine, Fault))}
-    run = playback(_whole(trace), "run", [*processes])
-    topics = tuple(replace(topic, sender=SENDERS[topic.sender]) for topic in run.topics)
-    return render_run(trace.scenario, why, replace(run, topics=topics), facts)
+    test, whole = _with_text(test or SideOfTest()), _whole(trace)
+    run = played_test(whole, test, [*processes])
+    failing = "" if test.failed_at is None else linecache.getline(*test.failed_at).strip()
+    charts, steps = value_charts(whole, test), shown_steps(test, failing)
+    return render_run(trace.scenario, why, run, facts, charts, steps, test.omitted, _excerpts(test))
+
+
+def _with_text(test: SideOfTest) -> SideOfTest:
+    """Return what a test did with the lines of its calls."""
+    calls = (replace(call, text=linecache.getline(call.file, call.line).strip()) for call in test.calls)
+    return replace(test, calls=tuple(calls))
+
+
+def _excerpts(test: SideOfTest) -> list[Excerpt]:
+    """Return the source around the line at which the test failed, and around those at which programs did."""
+    places = [*([test.failed_at] if test.failed_at else []), *test.faults_at]
+    found = (
+        excerpt_around(Location(Path(file).name, line), [text.rstrip("\n") for text in linecache.getlines(file)])
+        for file, line in dict.fromkeys(places)
+    )
+    return [excerpt for excerpt in found if excerpt is not None]
 
 
 def _whole(trace: AssessedTrace) -> AssessedTrace:

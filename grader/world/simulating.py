@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from itertools import islice
 from random import Random
 from typing import Any, NamedTuple
 
@@ -11,12 +13,16 @@ from grader.runtime.message_classes import built, wanted_class
 from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.wording import printable
+from grader.runtime.model.worlds import Sketch
 from grader.runtime.plan import derive
 from grader.runtime.simulation import SIMULATIONS, Moment, Simulation, WallMap, types_heard
 from grader.runtime.simulation.loading import SimulationError, begin_of, guarded, made_simulation
 from grader.runtime.steps import Simulate
 from grader.world import telling
 from grader.world.timeline import Timeline
+
+#: Of what a simulation draws, so much is on the page of a run.
+_MOST_SKETCHES = 100
 
 
 class NamedSimulations(NamedTuple):
@@ -117,6 +123,12 @@ class SimulationsOfTest:
     def sides(self) -> Iterator[telling.Sides]:
         """Yield what each of them publishes, hears and serves."""
         return (telling.sides_of(part.simulation) for part in self._parts)
+
+    def sketches(self) -> Iterator[Sketch]:
+        """Yield what each has drawn; one whose method fails has no picture: what happened in the run counts."""
+        for part in self._parts:
+            with suppress(Exception):
+                yield from [*islice(part.simulation.drawing(), _MOST_SKETCHES)]
 
     def topics(self) -> set[str]:
         """Return the topics that they publish on."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from random import Random
 from typing import Any, ParamSpec, TypeVar
 
+from grader.grading.model.tested_run import SideOfTest
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
 from grader.runtime.model.quantities import NS_PER_S, seconds
@@ -31,6 +32,7 @@ from grader.runtime.steps import ReadSteps
 from grader.world.account import RunAccount
 from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
 from grader.world.calling import Calls
+from grader.world.calls import CallLog, noted_call
 from grader.world.errors import NoMessage, ParameterRejected, StepTimeout
 from grader.world.frames import TRANSFORMS, FrameTransform, last_links, transform_between
 from grader.world.golden import compare_with_kept, write_kept
@@ -112,14 +114,17 @@ class World:
         self._observed = Observed(setting.read)
         self._timeline = Timeline(setting.session, plan, self._observed)
         self._run = self._timeline.run
+        self._log = CallLog(lambda: self._timeline.now_ns)
+        self._timeline.join(self._log)
         self._programs = RunningPrograms(self._timeline, self._observed, setting.source, plan)
-        simulations = SimulationsOfTest(self._timeline, seed, setting.simulations)
-        self._offers = Offers(self._timeline, self._observed, simulations)
+        self._simulations = SimulationsOfTest(self._timeline, seed, setting.simulations)
+        self._offers = Offers(self._timeline, self._observed, self._simulations)
         self._account = setting.account(plan.scenario, self._timeline, self._observed, self._programs, self._offers)
         self._calls = Calls(self._timeline, self._observed, self._account, seed)
 
     # ------------------------------------------------------------- programs
 
+    @noted_call
     @_with_hint
     def run(  # noqa: PLR0913 - what a launch file may say of a node
         self,
@@ -164,6 +169,7 @@ class World:
         )
         return self._programs.start(ProgramStart(found, start, dict(env or {}), tuple(values), dict(remappings or {})))
 
+    @noted_call
     def restart(self, program: Program, *, timeout: float = 10.0) -> Program:
         """Stop a program as Ctrl-C does, let time pass until it has ended, and start it again as `run` started it.
 
@@ -190,6 +196,7 @@ class World:
             self.wait_until(lambda: not program.running, timeout)
         return self._programs.restart(program)
 
+    @noted_call
     @_with_hint
     def launch(self, file: str | Path, *, arguments: Mapping[str, Any] | None = None) -> Launched:
         """Start the nodes that a launch file describes.
@@ -213,6 +220,7 @@ class World:
         __tracebackhide__ = True
         return seconds(self._timeline.begin_ns())
 
+    @noted_call
     def advance(self, seconds: float) -> None:
         """Let so many seconds pass, with everything that happens at their end; 0 is as good as `settle`.
 
@@ -222,6 +230,7 @@ class World:
         __tracebackhide__ = True
         self._timeline.advance(seconds)
 
+    @noted_call
     def settle(self) -> None:
         """Let everything happen that happens now, such as the reaction to a message; no virtual time passes.
 
@@ -230,6 +239,7 @@ class World:
         __tracebackhide__ = True
         self._timeline.settle()
 
+    @noted_call
     def wait_until(self, condition: Callable[[], Value], timeout: float) -> Value:
         """Let time pass until a condition holds, and return its value.
 
@@ -260,6 +270,7 @@ class World:
 
         return self._timeline.wait(holds, timeout, too_late)
 
+    @noted_call
     def wait_for_log(self, match: str, timeout: float, *, program: Program | None = None) -> LogRecord | OutputLine:
         """Let time pass until a program has logged or written something, and return that; what is there already counts.
 
@@ -293,6 +304,7 @@ class World:
 
     # --------------------------------------------------------------- acting
 
+    @noted_call
     def publish(self, topic: str, message: Any, *, rate: float | None = None, qos: QoSProfile | None = None) -> None:
         """Publish a message now, or from now on with a rate; that replaces what the test published on the topic before.
 
@@ -310,6 +322,7 @@ class World:
         __tracebackhide__ = True
         self._offers.publish(publication(absolute_name(topic), message, rate), qos)
 
+    @noted_call
     @_with_hint
     def play(
         self, bag: str | Path, *, topics: Iterable[str] | None = None, rate: float = 1.0, qos: QoSProfile | None = None
@@ -339,11 +352,13 @@ class World:
             self._offers.publish(command, qos)
         return length_of(commands)
 
+    @noted_call
     def stop_publishing(self, topic: str) -> None:
         """End what the test publishes on a topic; its publisher stays."""
         __tracebackhide__ = True
         self._offers.stop_publishing(absolute_name(topic))
 
+    @noted_call
     def serve(self, name: str, type: Any, function: Callable[[Any], Any]) -> None:  # noqa: A002 - as in rclpy
         """Offer a service; serving it again replaces the function.
 
@@ -359,6 +374,7 @@ class World:
         __tracebackhide__ = True
         self._offers.serve(absolute_name(name), message_type_name(type, "srv"), function)
 
+    @noted_call
     def serve_action(
         self,
         name: str,
@@ -387,6 +403,7 @@ class World:
         interface = message_type_name(type, "action")
         self._offers.serve_action(ServedAction(absolute_name(name), interface, answer, preempts=preempts))
 
+    @noted_call
     def call(self, name: str, request: Any, *, timeout: float = 10.0) -> Any:
         """Call a service, let time pass until the response is there, and return it.
 
@@ -402,6 +419,7 @@ class World:
         __tracebackhide__ = True
         return self.call_async(name, request).wait(timeout)
 
+    @noted_call
     def call_async(self, name: str, request: Any) -> PendingCall:
         """Call a service, and return at once; the request is sent with the next step, when its server is there.
 
@@ -418,6 +436,7 @@ class World:
         __tracebackhide__ = True
         return self._calls.call(absolute_name(name), request)
 
+    @noted_call
     def send_goal(
         self, name: str, goal: Any, *, cancel_after: float | None = None, timeout: float = 60.0
     ) -> GoalResult:
@@ -436,6 +455,7 @@ class World:
         __tracebackhide__ = True
         return self._calls.send_goal(absolute_name(name), goal, cancel_after).wait(timeout)
 
+    @noted_call
     def send_goal_async(self, name: str, goal: Any) -> GoalHandle:
         """Send a goal to an action, and return at once; it is sent with the next step, when its server is there.
 
@@ -452,6 +472,7 @@ class World:
         __tracebackhide__ = True
         return self._calls.send_goal(absolute_name(name), goal)
 
+    @noted_call
     def set_parameter(self, node: str, name: str, value: Any, *, timeout: float = 10.0) -> None:
         """Set a parameter of a node while it is running, as `ros2 param set` does.
 
@@ -472,6 +493,7 @@ class World:
         if not result.successful:
             raise ParameterRejected(f"{absolute_name(node)}: {name} = {value!r} was not accepted: {result.reason}")
 
+    @noted_call
     @_with_hint
     def simulate(self, simulation: Simulation | str, **parameters: Any) -> Simulation:
         """Let a simulation take part from now on; its methods run in the test's process, while time stands still.
@@ -493,6 +515,7 @@ class World:
 
     # --------------------------------------------------------------- looking
 
+    @noted_call
     def received(self, topic: str, type: Any = None) -> list[Received]:  # noqa: A002 - as in rclpy
         """Return the messages that programs have published on a topic so far, with their times.
 
@@ -506,8 +529,10 @@ class World:
         __tracebackhide__ = True
         self._timeline.catch_up()
         topic = absolute_name(topic)
+        self._log.looked_at[topic] = None
         return Messages(self._observed.received(topic, type), lambda: self._account.silence(topic))
 
+    @noted_call
     def messages(self, topic: str, type: Any = None) -> list[Any]:  # noqa: A002 - as in rclpy
         """Return the messages that programs have published on a topic so far.
 
@@ -522,6 +547,7 @@ class World:
         found, topic = self.received(topic, type), absolute_name(topic)
         return Messages([one.message for one in found], lambda: self._account.silence(topic))
 
+    @noted_call
     def transform(self, target: str, source: str) -> FrameTransform:
         """Return where a frame is in another one now, by the last transforms that programs have published.
 
@@ -537,6 +563,7 @@ class World:
         links = last_links([one.message for one in sent])
         return transform_between(links, target.lstrip("/"), source.lstrip("/"))
 
+    @noted_call
     @_with_hint
     def record(
         self,
@@ -573,6 +600,7 @@ class World:
         late_ns = None if self._timeline.is_real else round(time_tolerance * NS_PER_S)
         compare_with_kept(path, now, names, allowed, late_ns)
 
+    @noted_call
     def rate(self, topic: str, *, last: float | None = None) -> float:
         """Return how many messages a second programs publish on a topic, from the first to the last one.
 
@@ -585,26 +613,31 @@ class World:
         """
         __tracebackhide__ = True
         self._timeline.catch_up()
+        self._log.looked_at[absolute_name(topic)] = None
         since_ns = 0 if last is None else self._timeline.now_ns - round(last * NS_PER_S)
         return self._observed.rate(absolute_name(topic), since_ns)
 
+    @noted_call
     def nodes(self) -> list[str]:
         """Return the full names of the programs' nodes, sorted."""
         __tracebackhide__ = True
         return sorted(self.graph().nodes)
 
+    @noted_call
     def topics(self) -> dict[str, str]:
         """Return the topics that programs publish on or subscribe to, with their types."""
         __tracebackhide__ = True
         self._timeline.catch_up()
         return self._observed.topics()
 
+    @noted_call
     def services(self) -> dict[str, str]:
         """Return the services that programs offer, with their types; without those that every node has."""
         __tracebackhide__ = True
         self._timeline.catch_up()
         return {end.service: end.type for end in self._observed.servers()}
 
+    @noted_call
     def graph(self) -> GraphSnapshot:
         """Return nodes, publishers, subscriptions, servers and clients of the programs as they are now."""
         __tracebackhide__ = True
@@ -641,18 +674,32 @@ class World:
         """Return what was observed so far as a trace, as checks of a rubric read it."""
         return self._account.trace()
 
-    def keep(self, folder: Path | str, why: str = "") -> list[Path]:
+    def keep(self, folder: Path | str, why: str = "", failed_at: tuple[str, int] | None = None) -> list[Path]:
         """Write what happened so far into a folder, and return the paths: an MCAP file, and a page that plays the run.
 
         Args:
             folder: Where; it is created if it is not there.
             why: What the page says above the run.
+            failed_at: Path and line at which the test has failed, which the page shows on its time line.
         """
         from grader.world.keeping import keep  # noqa: PLC0415 - takes long, and most tests pass
 
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
-        return keep(self._recorded_in(), self.trace(), self._drawn, place, why)
+        return keep(self._recorded_in(), self.trace(), self._drawn, place, why, self._side_of_test(failed_at))
+
+    def _side_of_test(self, failed_at: tuple[str, int] | None = None) -> SideOfTest:
+        """Return what the test itself has done so far."""
+        faults = [(program.root, program.fault) for program in self.programs if program.fault is not None]
+        return SideOfTest(
+            calls=tuple(self._log.calls),
+            omitted=self._log.count - len(self._log.calls),
+            ends=tuple((t_ns, end) for end, t_ns in self._log.ends.items()),
+            looked_at=tuple(self._log.looked_at),
+            failed_at=failed_at,
+            faults_at=tuple((str(root / fault.file), fault.line) for root, fault in faults if fault.file),
+            sketches=tuple(self._simulations.sketches()),
+        )
 
     def _recorded_in(self) -> RecordingSession:
         """Return the session that a run is kept with; raises ValueError for a test of a rubric, which has none."""
@@ -671,7 +718,7 @@ class World:
         """Return the run so far as a notebook shows it: a page in the page that plays it."""
         from grader.world.keeping import page_of  # noqa: PLC0415 - as above
 
-        page = html.escape(page_of(self._recorded_in(), self.trace(), self._drawn))
+        page = html.escape(page_of(self._recorded_in(), self.trace(), self._drawn, "", self._side_of_test()))
         return f'<iframe sandbox="allow-scripts" style="width:100%;height:60em;border:0" srcdoc="{page}"></iframe>'
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
 
@@ -14,7 +14,7 @@ from grader.grading.model.measures import Reading
 from grader.grading.model.wording import first_few, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds, within
-from grader.runtime.model.trace import LogRecord, OutputLine, Request, Response, Trace
+from grader.runtime.model.trace import LogRecord, OutputLine, Request, Response, Trace, offered_as
 
 #: Maximum number of points of a series: a screen shows no more, and a flood must not enlarge the report.
 MOST_POINTS = 1200
@@ -97,12 +97,17 @@ def drawn_case(start_ns: int, stop_ns: int, label: str, tone: Tone = Tone.FAINT)
     return Stretch(seconds(start_ns), seconds(stop_ns), label, tone)
 
 
+#: What both sides of a call are named, by the sender of an observation.
+SIDES = {"grader": "grader", "student": "student"}
+
+
 @dataclass(slots=True)
 class Lanes:
     """Rows of dots, from the top."""
 
     names: list[str] = field(default_factory=list)
     rows: list[Series] = field(default_factory=list)
+    sides: Mapping[str, str] = field(default_factory=lambda: SIDES)  # what both sides of a call are named
 
     def add(self, name: str) -> None:
         """Begin another row."""
@@ -146,7 +151,8 @@ class Lanes:
         sent = list(exchanges)
         for name, kind, tone in (("request", Request, Tone.SECOND), ("response", Response, Tone.MAIN)):
             some = [o for o in sent if isinstance(o, kind)]
-            self.dots(name, ((o.t_ns, f"{name} {o.number} of the {o.sender}: {dict(o.value)}") for o in some), tone)
+            told = ((o.t_ns, f"{name} {o.number} of the {self.sides[o.sender]}: {dict(o.value)}") for o in some)
+            self.dots(name, told, tone)
 
     def panel(self, title: str = "") -> Panel:
         """Return the rows as a panel."""
@@ -177,9 +183,10 @@ _MOST_FAULTS, MOST_CASES = 5, 60
 
 
 def marked_moments(trace: Trace) -> list[VerticalLine]:
-    """Return when streams, servers and processes began and ended."""
-    names = _SAID_OF_MARKS.items()
-    return [VerticalLine(seconds(m.t_ns), f"{m.detail}{said}") for name, said in names for m in trace.marks(name)]
+    """Return when streams, servers and processes began and ended; of an action it is its server that takes goals."""
+    marks = [(m, said) for name, said in _SAID_OF_MARKS.items() for m in trace.marks(name)]
+    told = [(m, offered_as(m.detail), said) for m, said in marks]
+    return [VerticalLine(seconds(m.t_ns), f"{offered[1]}{said}") for m, offered, said in told if offered]
 
 
 def time_chart(trace: Trace, id_: str, title: str, about: str, *panels: Panel, cases: Sequence[Stretch] = ()) -> Chart:

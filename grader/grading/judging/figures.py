@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import msgspec
@@ -38,7 +39,7 @@ from grader.runtime.model.author_files import AuthorMistake
 from grader.runtime.model.quantities import counted, seconds
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.submission import Submission
-from grader.runtime.model.trace import GraphSnapshot, Request, Response, Trace, offered_as
+from grader.runtime.model.trace import Endpoint, GraphSnapshot, Request, Response, ServiceEnd, Trace, offered_as
 from grader.runtime.model.worlds import Sketch
 
 
@@ -216,8 +217,15 @@ def _playbacks(exercise: Exercise, traces: Mapping[str, Trace], told: Set[str]) 
         yield playback(traces[scenario.id], scenario.id, scenario.processes, title, criteria)
 
 
-def playback(
-    trace: Trace, scenario: str, processes: Sequence[str], title: str = "The run", criteria: tuple[str, ...] = ()
+def playback(  # noqa: PLR0913  what a recording to play consists of
+    trace: Trace,
+    scenario: str,
+    processes: Sequence[str],
+    title: str = "The run",
+    criteria: tuple[str, ...] = (),
+    *,
+    lanes: Lanes | None = None,
+    beside: Sequence[tuple[int, Endpoint | ServiceEnd]] = (),
 ) -> Playback:
     """Return a recording to play.
 
@@ -227,9 +235,11 @@ def playback(
         processes: Names of its processes.
         title: Title of the figure.
         criteria: The criteria that are shown with it.
+        lanes: Rows that stand above those of the processes, and what both sides of a call are named.
+        beside: What stands in the graph beside the programs, each with the time from which on, in nanoseconds.
     """
-    timeline = replace(timeline_chart(trace, processes), scenario=scenario)
-    graphs = _changes(trace)
+    timeline = replace(timeline_chart(trace, processes, lanes), scenario=scenario)
+    graphs = _changes(trace, beside)
     connected = f" {_said(graphs[-1][1])}." if graphs and graphs[-1][1].nodes else ""
     return Playback(
         id="run",
@@ -250,12 +260,17 @@ def _is_recorded(criterion: Criterion, told: Set[str]) -> bool:
 _MOST_CHANGES = 40
 
 
-def _changes(trace: Trace) -> tuple[tuple[float, GraphSnapshot], ...]:
-    """Return the student's own graph from each moment at which it changed, in seconds."""
+def _changes(
+    trace: Trace, beside: Sequence[tuple[int, Endpoint | ServiceEnd]] = ()
+) -> tuple[tuple[float, GraphSnapshot], ...]:
+    """Return the student's own graph, and what stands beside it, from each moment of a change, in seconds."""
+    own = {graph.t_ns: _own(graph) for graph in trace.graphs()}
     last: dict[float, GraphSnapshot] = {}
-    for graph in trace.graphs():
-        if graph.t_ns <= trace.stop_ns:
-            last[seconds(graph.t_ns)] = _own(graph)
+    graph = GraphSnapshot(0, (), ())
+    for t_ns in sorted({*own, *(since_ns for since_ns, _ in beside)}):
+        graph = own.get(t_ns, graph)
+        if t_ns <= trace.stop_ns:
+            last[seconds(t_ns)] = _with(graph, [end for since_ns, end in beside if since_ns <= t_ns])
     times = list(last)
     changed = [t for k, t in enumerate(times) if k == 0 or last[t] != last[times[k - 1]]]
     stride = -(-len(changed) // _MOST_CHANGES) or 1
@@ -277,11 +292,12 @@ def excerpts_for(report: ExerciseReport, submission: Submission, sources: Mappin
     places += [Location(f.file, f.line) for f in report.faults if f.file and f.line > 0]
     texts = {file.found: sources[wanted] for wanted, file in submission.files.items() if wanted in sources}
     lines = {name: text.splitlines() for name, text in texts.items() if any(p.file == name for p in places)}
-    found = (_excerpt(place, lines.get(place.file, [])) for place in dict.fromkeys(places))
+    found = (excerpt_around(place, lines.get(place.file, [])) for place in dict.fromkeys(places))
     return tuple(excerpt for excerpt in found if excerpt is not None)
 
 
-def _excerpt(place: Location, lines: list[str]) -> Excerpt | None:
+def excerpt_around(place: Location, lines: list[str]) -> Excerpt | None:
+    """Return the source around a place; None if it is not in these lines of its file."""
     if not 1 <= place.line <= len(lines):
         return None
     first = max(1, place.line - AROUND)
@@ -326,6 +342,13 @@ def _own(graph: GraphSnapshot) -> GraphSnapshot:
     return replace(graph, t_ns=0, endpoints=tuple(e for e in graph.endpoints if on_student_topic(e)))
 
 
+def _with(graph: GraphSnapshot, ends: Sequence[Endpoint | ServiceEnd]) -> GraphSnapshot:
+    """Return a graph with further ends."""
+    topics = tuple(end for end in ends if isinstance(end, Endpoint))
+    services = tuple(end for end in ends if isinstance(end, ServiceEnd))
+    return replace(graph, endpoints=(*graph.endpoints, *topics), services=(*graph.services, *services))
+
+
 def _size(graph: GraphSnapshot) -> int:
     return len(graph.endpoints) + len(graph.services)
 
@@ -345,20 +368,23 @@ def _said(graph: GraphSnapshot) -> str:
     return ", ".join(dict.fromkeys(parts)) or f"{counted(len(graph.nodes), 'node')} without topics"
 
 
-#: Number of lanes for services; a node's parameters and an action need several.
+#: Number of lanes for services and actions; a node's parameters need several.
 MOST_SERVICES = 6
 
 
-def timeline_chart(trace: Trace, processes: Sequence[str]) -> Chart:
-    """Return the timeline of a scenario; it exists even for a silent node."""
-    lanes = Lanes()
+def timeline_chart(trace: Trace, processes: Sequence[str], lanes: Lanes | None = None) -> Chart:
+    """Return the timeline of a scenario, below the rows that are given; it exists even for a silent node."""
+    lanes = lanes or Lanes()
     for process in processes:
         lanes.logs(trace, process)
     sent: list[Request | Response] = [*trace.of(Request), *trace.of(Response)]
     exchanges = [o for o in sent if o.t_ns <= trace.stop_ns]
-    for service in list(dict.fromkeys(o.service for o in exchanges))[:MOST_SERVICES]:
-        lanes.add(f"{service}: called")
-        lanes.exchanges(o for o in exchanges if o.service == service)
+    rows: dict[str, list[Request | Response]] = {}
+    for exchange in exchanges:
+        rows.setdefault(exchange.service.partition("/_action/")[0], []).append(exchange)
+    for name, found in islice(rows.items(), MOST_SERVICES):
+        lanes.add(f"{name}: called")
+        lanes.exchanges(found)
     faults = [(f.t_ns, fault_sentence(f)) for f in trace.faults() if f.t_ns <= trace.stop_ns]
     faults += [(m.t_ns, m.detail) for m in trace.marks("limit")]
     if faults:

@@ -12,6 +12,7 @@ from typing import Any
 from grader.grading.judging.charts import (
     MOST_CASES,
     MOST_POINTS,
+    SIDES,
     Lanes,
     drawn_case,
     expected_series,
@@ -108,6 +109,8 @@ class Drawing:
         processes: Files whose output is shown.
         cases: Cases that the check distinguishes.
         title: Title of the chart; made from the rest if left out.
+        sides: What both sides of a call are named, by the sender of an observation.
+        came: The words before the topic of messages of the grader.
     """
 
     topics: tuple[Plot, ...] = ()
@@ -119,6 +122,8 @@ class Drawing:
     processes: tuple[str, ...] = ()
     cases: tuple[Stretch, ...] = ()
     title: str = ""
+    sides: Mapping[str, str] = field(default_factory=lambda: SIDES)
+    came: str = "received on"
 
 
 _Panels = list[tuple[Panel, str]]
@@ -174,16 +179,16 @@ def drawn_chart(drawing: Drawing, trace: Trace) -> Chart | None:
     for plot in drawing.topics:
         given, sent = delivered(trace, plot.topic), published(trace, plot.topic)
         if given:
-            above += _topic_panels(plot, given, "came", several=several or bool(sent))
+            above += _topic_panels(plot, given, drawing.came, several=several or bool(sent), steps=True)
             came.append(plot.topic)
         if sent:
-            below += _topic_panels(plot, sent, "published", several=several or bool(given))
+            below += _topic_panels(plot, sent, "published on", several=several or bool(given))
             went.append(plot.topic)
     for service in drawing.services:
         above += _call_panels(trace, service, drawing)
     cases = [*drawing.cases]
     if drawing.action:
-        panels, goals = _action_panels(trace, drawing.action)
+        panels, goals = _action_panels(trace, drawing.action, drawing.sides)
         above, cases = [*above, *panels], [*cases, *goals]
     cases = _joined(cases)
     found = [*above, *below, *drawing.panels][:_MOST_PANELS]
@@ -196,14 +201,14 @@ def drawn_chart(drawing: Drawing, trace: Trace) -> Chart | None:
         found.append((lanes.panel("written"), f"Meanwhile {process} wrote {counted(records, 'text')}."))
     asked = [f"calls of {s}" for s in drawing.services]
     asked += [f"goals of {drawing.action}"] if drawing.action else []
-    title = drawing.title or _title(came, went, asked, drawing.processes)
+    title = drawing.title or _title(drawing.came, came, went, asked, drawing.processes)
     about = " ".join(said for _, said in found if said)
     about += _cases_said(cases)
     return time_chart(trace, title, title, about, *(panel for panel, _ in found), cases=cases)
 
 
-def _title(came: Sequence[str], went: Sequence[str], asked: Sequence[str], processes: Sequence[str]) -> str:
-    parts = [f"messages received on {' and '.join(came[:2])}"] if came else []
+def _title(how: str, came: Sequence[str], went: Sequence[str], asked: Sequence[str], processes: Sequence[str]) -> str:
+    parts = [f"messages {how} {' and '.join(came[:2])}"] if came else []
     parts += [f"messages published on {' and '.join(went[:2])}"] if went else []
     parts += [first_few(asked)] if asked else []
     parts += [f"output of {first_few(processes)}"] if processes else []
@@ -235,12 +240,11 @@ def _cases_said(cases: Sequence[Stretch]) -> str:
 # --- topics -----------------------------------------------------------------------------------------------------------
 
 
-def _topic_panels(plot: Plot, items: Sequence[Item], verb: str, *, several: bool) -> _Panels:
+def _topic_panels(plot: Plot, items: Sequence[Item], how: str, *, several: bool, steps: bool = False) -> _Panels:
     timed = [(item.t_ns, item.value) for item in items]
-    how = {"came": "received on", "published": "published on"}[verb]
     head = f"{counted(len(items), 'message')} {how} {plot.topic}"
     plot = replace(plot, number=number_path(items[0].value) or plot.number) if items else plot
-    return value_panels(plot, timed, head, plot.topic if several else "", steps=verb == "came")
+    return value_panels(plot, timed, head, plot.topic if several else "", steps=steps)
 
 
 def value_panels(plot: Plot, timed: Sequence[_Timed], head: str, prefix: str = "", *, steps: bool = False) -> _Panels:
@@ -488,12 +492,13 @@ def _call_panels(trace: Trace, service: str, drawing: Drawing) -> _Panels:
     answered = [(c, c.response) for c in calls if c.response is not None]
     asked = [(c.request.t_ns, c.request.value) for c in calls]
     told = [(response.t_ns, response.value) for _, response in answered]
-    lanes = Lanes()
+    lanes = Lanes(sides=drawing.sides)
     lanes.add("request")
     lanes.exchanges(c.request for c in calls)
     lanes.add("response")
     lanes.exchanges(response for _, response in answered)
-    said = f"{counted(len(calls), 'request')} of the {asker} on {service}, {counted(len(answered), 'response')}."
+    said = f"{counted(len(calls), 'request')} of the {drawing.sides[asker]} on {service}, "
+    said += f"{counted(len(answered), 'response')}."
     panels: _Panels = [(lanes.panel(service), said)]
     lasted = [(c.request.t_ns, r.t_ns - c.request.t_ns) for c, r in answered]
     if drawing.within_ns is not None or (asker == "grader" and any(ns >= _PROMPT_NS for _, ns in lasted)):
@@ -535,7 +540,7 @@ def delay_panel(what: str, lasted: Sequence[tuple[int, int]], within_ns: int | N
     return Panel(f"time to the {what}", unit, (dots,), levels=(level,)), said
 
 
-def _action_panels(trace: Trace, action: str) -> tuple[_Panels, list[Stretch]]:
+def _action_panels(trace: Trace, action: str, sides: Mapping[str, str]) -> tuple[_Panels, list[Stretch]]:
     """Return what was sent to an action's server and what came from it, and each goal as a case."""
     asker = _asker(trace, f"{action}/_action/send_goal")
     goals = calls_of(trace, f"{action}/_action/send_goal", asker)
@@ -561,7 +566,7 @@ def _action_panels(trace: Trace, action: str) -> tuple[_Panels, list[Stretch]]:
     lanes.add("result")
     told = [(r.t_ns, f"{status_of(r)}: {said_of(_part(r.value, 'result'))}") for r in ended]
     lanes.dots("result", told, Tone.THIRD)
-    said = f"{counted(len(goals), 'goal')} of the {asker} for {action}, "
+    said = f"{counted(len(goals), 'goal')} of the {sides[asker]} for {action}, "
     said += f"{counted(len(feedback), 'message')} of feedback, "
     said += f"{counted(len(cancels), 'request')} to cancel, {counted(len(ended), 'result')}."
     numbers = _only_values(Plot(action), [(m.t_ns, _part(m.value, "feedback")) for m in feedback], "feedback")

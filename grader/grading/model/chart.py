@@ -167,6 +167,17 @@ class Playback:
     graphs: tuple[tuple[float, GraphSnapshot], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class ShownStep:
+    """Something that a test did in its run."""
+
+    begin_s: float
+    end_s: float
+    place: str  # such as `line 12`
+    text: str  # the line of source
+    failed: bool  # whether the test failed there
+
+
 Figure = Chart | GraphFigure | Playback
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cache
 from itertools import islice
@@ -12,7 +12,18 @@ from typing import Any, TypeVar
 from jinja2 import Environment
 from markupsafe import Markup
 
-from grader.grading.model.chart import Chart, Excerpt, Figure, GraphFigure, Panel, Playback, Series, Stage, TopicValues
+from grader.grading.model.chart import (
+    Chart,
+    Excerpt,
+    Figure,
+    GraphFigure,
+    Panel,
+    Playback,
+    Series,
+    ShownStep,
+    Stage,
+    TopicValues,
+)
 from grader.grading.model.exercise import Audience, Location, Outcome, exercise_name
 from grader.grading.model.report import ExerciseReport, JsonObject, JsonValue, Report, ReportedFault, Verdict
 from grader.grading.reporting import wording
@@ -265,7 +276,16 @@ def render_html(report: Report, *, assets: str | None = None, recordings: str = 
     )
 
 
-def render_run(title: str, why: str, run: Playback, facts: Mapping[str, str]) -> str:
+def render_run(  # noqa: PLR0913  what the page shows
+    title: str,
+    why: str,
+    run: Playback,
+    facts: Mapping[str, str],
+    charts: Sequence[Chart] = (),
+    steps: Sequence[ShownStep] = (),
+    omitted: int = 0,
+    excerpts: Sequence[Excerpt] = (),
+) -> str:
     """Return a page that plays one run, in one file that makes no network requests; all its text is hostile.
 
     Args:
@@ -273,8 +293,14 @@ def render_run(title: str, why: str, run: Playback, facts: Mapping[str, str]) ->
         why: What is to be told about it; may be empty.
         run: The run.
         facts: Names and values of what it was made with.
+        charts: Charts of the run.
+        steps: What was done in it, in order.
+        omitted: How many steps there were before these.
+        excerpts: The source around the lines at which something failed.
     """
     columns = Columns()
+    drawn: tuple[Figure, ...] = (run, *charts)
+    figures = {figure.id: figure_values(figure, columns) for figure in drawn}
     return (
         _templates()
         .get_template("run.html")
@@ -282,10 +308,14 @@ def render_run(title: str, why: str, run: Playback, facts: Mapping[str, str]) ->
             title=title,
             why=why,
             run_figure=run,
+            charts=charts,
+            steps=steps,
+            omitted=omitted,
+            excerpts=excerpts,
             facts=facts,
             bundle=bundle(),
             embedded=Markup,
-            figures=Markup(script_json({"figures": {run.id: figure_values(run, columns)}, "columns": columns.lists})),  # noqa: S704  as above
+            figures=Markup(script_json({"figures": figures, "columns": columns.lists})),  # noqa: S704  as above
         )
     )
 

@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 import graded
 import pytest
+from stepped import page_of_failed_test
 from tiers import NIGHTLY, each, more
 
 from grader.grading.model.chart import GraphFigure, Playback, Stage
@@ -568,6 +569,45 @@ def test_axe_finds_nothing(visit: Open, scheme: str, width: int) -> None:
     found += axe.Axe().run(page).response["violations"]
     assert [(one["id"], node["html"]) for one in found for node in one["nodes"]] == []
     assert said == []
+
+
+@pytest.mark.breadth(1, 1)
+@pytest.mark.parametrize(("scheme", "width"), each([("dark", 390), ("light", 1280)], 2))
+def test_the_page_of_a_failed_test_is_drawn_fits_and_has_no_fault(visit: Open, scheme: str, width: int) -> None:
+    """Every figure has a picture, nothing sticks out, the console is silent, and axe-core finds nothing."""
+    page, said, asked = visit(page_of_failed_test(), color_scheme=scheme, viewport={"width": width, "height": 900})
+    unfold(page)
+    drawn = drawings(page)
+    assert len(drawn) == 5
+    assert [id_ for id_, there in drawn if not there] == []
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    boxes = page.locator(".live [data-box]").evaluate_all("(all) => all.map((box) => box.getAttribute('aria-label'))")
+    assert {"node the test", "service /addfine, fine", "topic /a, std_msgs/msg/Float32"} <= set(boxes)
+    page.locator(".player input").evaluate("(e) => { e.value = 2; e.dispatchEvent(new Event('input')); }")
+    assert page.locator(".playhead:not([hidden])").count() == 5
+    assert "the test" in page.locator(".log li:not([hidden])").first.inner_text()
+    assert (said, len(asked)) == ([], 1)
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'")
+    found = axe.Axe().run(page).response["violations"]
+    assert [(one["id"], node["html"]) for one in found for node in one["nodes"]] == []
+
+
+@pytest.mark.breadth(1, 0)
+@pytest.mark.parametrize("text", each(ATTACKS, len(ATTACKS)))
+def test_hostile_text_stays_text_on_the_page_of_a_failed_test(visit: Open, text: str) -> None:
+    """In its steps, source, tooltips, tables, values and log."""
+    page, said, asked = visit(page_of_failed_test(text))
+    unfold(page)
+    for summary in page.query_selector_all("figure .table > summary"):
+        summary.click()
+    for drawing in page.query_selector_all(".drawing"):
+        drawing.focus()
+        page.keyboard.press("ArrowRight")
+    assert page.evaluate("document.querySelectorAll('img, iframe, object, embed, [onload], [onerror]').length") == 0
+    assert page.evaluate("document.scripts.length") == 2
+    assert text in page.inner_text("h1")
+    assert "owned" not in page.title().replace(text, "")
+    assert (said, len(asked)) == ([], 1)
 
 
 @pytest.mark.nightly
