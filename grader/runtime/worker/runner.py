@@ -335,6 +335,7 @@ class Runner(ABC):
         self._services_of[name] = service
         self.launched[name] = service.root
         self._students.append(student)
+        self._recorder.allow_participant()
         self._agenda.starts_ns[name] = max(1, now_ns)  # it is marked as one that starts late
         self._begin_process(student, 0)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import NS_PER_S, size
@@ -40,6 +41,10 @@ class TraceRecorder:
         self._counts: Counter[type] = Counter()
         self.observations: list[Observation] = []
         self.full = ""
+
+    def allow_participant(self) -> None:
+        """Allow one more DDS participant, for a process that was started while recording."""
+        self._limits = replace(self._limits, participants=self._limits.participants + 1)
 
     @property
     def graph(self) -> GraphSnapshot:

@@ -73,6 +73,15 @@ def test_participants_are_bounded() -> None:
     assert marks(recorder) == [(2, f"more than 2 DDS participants: {REST}")]
 
 
+def test_a_process_that_is_started_again_may_have_a_participant() -> None:
+    """A launch file may start a node again more often than a scenario has participants."""
+    recorder = TraceRecorder(Limits(participants=1))
+    for n in range(1, 5):
+        assert recorder.look(graph(n, nodes=n), participants=n)
+        recorder.allow_participant()
+    assert not recorder.look(graph(6), participants=6)
+
+
 @pytest.mark.parametrize("size", [{"nodes": module.ENDPOINTS + 1}, {"ends": module.ENDPOINTS + 1}])
 def test_a_graph_beyond_all_measure_ends_the_recording(size: dict[str, int]) -> None:
     """It is not even kept."""
