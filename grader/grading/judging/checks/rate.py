@@ -15,6 +15,7 @@ from grader.grading.judging.findings import (
     explain_no_message,
     fault_hint,
     fault_sentence,
+    faults_before_stop,
     first_fault,
     met,
     not_met,
@@ -31,6 +32,8 @@ from grader.runtime.model.trace import ClockKind, Fault, FaultKind, Trace
 
 #: How much later than two periods before the end the last message may be missing: rounding, or a busy machine.
 _END_SLACK_NS = {ClockKind.VIRTUAL: NS_PER_MS, ClockKind.WALL: 250 * NS_PER_MS}
+#: A fault in an interval so many times as long as usual has interrupted the messages.
+_PAUSE = 1.5
 #: Fewer messages in the last quarter give no rate.
 _FEWEST_LATER = 10
 
@@ -115,7 +118,7 @@ class TopicRate:
         evidence = self._evidence(found)
         # A flaw first: with bursts, a stop or a late start, the average says nothing, however right it is.
         graded = self._flaw(trace, found, evidence) or self._grade(found, evidence)
-        finding = (self._slack(found, evidence) if graded.credit else None) or graded
+        finding = (self._slack(found, evidence) if graded.credit else None) or _after_fault(graded, trace, found)
         return replace(finding, facts=RateFacts(len(inside), seconds(inside[0]), found.rate_hz, found.max_s, self.rate))
 
     @property
@@ -253,6 +256,21 @@ def _measure(times: tuple[int, ...], stop_ns: int) -> _Measured:
     # an exact sum of squares is slow, and in virtual time there is rarely any deviation
     deviation = statistics.pstdev(gaps) if high > low else 0.0
     return _Measured(times, stop_ns, rate_hz, low, high, deviation)
+
+
+def _after_fault(finding: Finding, trace: Trace, found: _Measured) -> Finding:
+    """Return a finding about too few messages with the fault that made them pause, after which a node began again."""
+    kind = finding.problem.kind if finding.problem is not None and not finding.credit else None
+    if kind not in (ProblemKind.BURSTS, ProblemKind.WRONG_RATE):
+        return finding
+    gaps = list(pairwise(found.times_ns))
+    longer = _PAUSE * statistics.median(b - a for a, b in gaps)
+    pauses = [(a, b) for a, b in gaps if b - a > longer]
+    fault = next((f for f in faults_before_stop(trace) if any(a <= f.t_ns <= b for a, b in pauses)), None)
+    if fault is None:
+        return finding
+    reason, hint = f"{finding.reason}; {fault_sentence(fault)}", fault_hint(fault)
+    return not_met(reason, finding.evidence, hint=hint, fault=fault, measured=finding.measured)
 
 
 def _ending(trace: Trace, first_ns: int, last_ns: int) -> tuple[str, Fault | None]:

@@ -122,6 +122,23 @@ def test_an_exit_is_the_reason_for_stopping() -> None:
         assert finding.location is not None
 
 
+@pytest.mark.parametrize("pause_s", [0.05, 1.0])
+def test_a_crash_after_which_a_node_is_started_again_is_the_reason_for_a_pause(pause_s: float) -> None:
+    """Neither the period nor bursts are, whatever the delay; the crash of a node beside it makes no pause."""
+    times, begins = [], 0.05
+    while begins < 10:
+        times += [begins + 0.05 * k for k in range(4)]
+        begins += 0.2 + pause_s
+    rec = published_at([t for t in times if t < 10]).crashed(times[3] + 0.04, line=31)
+    finding = RATE.judge(rec.trace())
+    assert finding.credit == 0
+    assert finding.reason.endswith("node.py:31: ValueError: no")
+    assert (finding.hint, finding.location is None) == ("", False)
+    beside = RATE.judge(velocity(10).crashed(5.02, line=31).trace())
+    assert (beside.credit, beside.location) == (0, None)
+    assert "create_timer(0.05, ...)" in beside.hint
+
+
 def test_bursts_are_no_rate() -> None:
     """20 messages at once each second have the average, not the rate."""
     times = [0.05 + second + k * 0.0001 for second in range(10) for k in range(20)]
