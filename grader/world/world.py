@@ -619,7 +619,10 @@ class World:
 
     @noted_call
     def nodes(self) -> list[str]:
-        """Return the full names of the programs' nodes, sorted."""
+        """Return the full names of the programs' nodes, sorted.
+
+        As in ROS, a node is there until it is destroyed or its program has ended, also after `rclpy.shutdown()`.
+        """
         __tracebackhide__ = True
         return sorted(self.graph().nodes)
 

@@ -1,6 +1,7 @@
 """When a node that ends has left the graph: at once with a farewell, and by its lease without one, in virtual time."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -103,6 +104,31 @@ def test_the_last_one_leaves_as_well(ros: World, write: Callable[[str, str], str
     assert ros.nodes() == ["/second"]
     ros.advance(0.1)
     assert (ros.nodes(), ros.graph().endpoints) == ([], ())
+
+
+@pytest.mark.parametrize("ending", FAREWELL.values(), ids=FAREWELL)
+def test_the_last_one_leaves_when_it_ends_by_itself(
+    ros: World, write: Callable[[str, str], str], ending: str
+) -> None:
+    """At the moment at which its program ends."""
+    program = ros.run(write("alone", TICKER.format(ending)))
+    ros.advance(2.5)
+    assert ros.nodes() == ["/alone"]
+    with ros.expects_failure() if "raise" in ending else nullcontext():
+        ros.advance(0.5)
+    assert not program.running
+    assert (ros.nodes(), ros.graph().endpoints, ros.graph().services) == ([], (), ())
+
+
+def test_a_node_that_is_shut_down_stays_while_its_program_runs(ros: World, write: Callable[[str, str], str]) -> None:
+    """As other programs see it on the wall clock: rclpy.shutdown() destroys no node."""
+    path = Path(write("lasting", TICKER.format("rclpy.shutdown()")))
+    path.write_text(f"{path.read_text(encoding='utf-8')}import time\ntime.sleep(5.0)\n", encoding="utf-8")
+    ros.run(path)
+    ros.advance(7.9)
+    assert ros.nodes() == ["/lasting"]
+    ros.advance(0.1)
+    assert ros.nodes() == []
 
 
 def test_who_comes_after_the_end_never_hears_of_the_dead(ros: World, write: Callable[[str, str], str]) -> None:
