@@ -35,7 +35,7 @@ Value = TypeVar("Value")
 #: Path, line and time at which a call began.
 _Begun = tuple[str, int, int]
 #: Where the grader's own code lies: the line of a call is the nearest one outside of it.
-_GRADER = str(Path(__file__).parents[1])
+_GRADER = f"{Path(__file__).parents[1]}/"
 
 
 class CallLog:
@@ -120,13 +120,7 @@ def noted_call(method: Callable[Given, Value]) -> Callable[Given, Value]:
         __tracebackhide__ = True
         world: Any = args[0]
         log: CallLog = world._log  # noqa: SLF001 - the methods of a world alone are decorated
-        begun, failed = log.begin(), True
-        try:
-            value = method(*args, **kwargs)
-            failed = False
-            return value
-        finally:
-            log.end(method.__name__, begun, failed=failed)
+        return log.noting(method.__name__, method)(*args, **kwargs)
 
     return called
 
