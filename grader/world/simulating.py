@@ -47,8 +47,9 @@ class _Part(NamedTuple):
             answer = getattr(self.simulation, method)(*arguments)
             return answer if answer is None or isinstance(answer, Mapping) else [*answer]
 
-        begins = begin_of(self.simulation, method, self.path) if self.path else 1
-        return guarded(self.name, self.path, work, begins) if self.path else work()
+        if not self.path:
+            return work()
+        return guarded(self.name, self.path, work, begin_of(self.simulation, method, self.path))
 
     def checked(self, method: str, answer: Any) -> Any:
         """Return what a method publishes; raises SimulationError for anything but a message of its topics."""
