@@ -354,6 +354,8 @@ def _size(graph: GraphSnapshot) -> int:
 
 
 def _said(graph: GraphSnapshot) -> str:
+    """Return in words what the picture of a graph shows, which leaves out the topics of actions."""
+    graph = replace(graph, endpoints=tuple(e for e in graph.endpoints if "/_" not in e.topic))
     publishers = [e for e in graph.endpoints if e.kind == "publisher"]
     parts = []
     for publisher in publishers:

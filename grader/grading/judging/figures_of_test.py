@@ -13,7 +13,7 @@ from grader.grading.judging.values import HIDDEN_TOPICS
 from grader.grading.model.chart import Chart, Panel, Playback, ShownStep, Stretch, Tone, VerticalLine
 from grader.grading.model.tested_run import NotedCall, SideOfTest
 from grader.runtime.model.quantities import counted, seconds
-from grader.runtime.model.trace import Delivery, Message, Request, Trace
+from grader.runtime.model.trace import Delivery, Endpoint, Message, Request, Trace
 
 #: What both sides are named, in the words of a test.
 SIDES_OF_TEST = {"grader": "test", "student": "program"}
@@ -39,18 +39,21 @@ def played_test(trace: Trace, test: SideOfTest, processes: Sequence[str]) -> Pla
         timeline,
         title="Steps of the test, logs, calls and faults over time",
         about=f"{_steps_said(test)}{timeline.about}",
-        panels=(*timeline.panels, *_messages(trace)),
+        panels=(*timeline.panels, *_messages(trace, test)),
         moments=(*timeline.moments, *_failure(test)),
         cases=tuple(islice(_stretches(test), _MOST_STRETCHES)),
     )
     shown = (topic for topic in run.topics if "/_" not in topic.topic)
-    topics = tuple(replace(topic, sender=SIDES_OF_TEST[topic.sender]) for topic in shown)
+    topics = tuple(
+        replace(topic, sender=_sender(topic.topic, test) if topic.sender == "grader" else SIDES_OF_TEST[topic.sender])
+        for topic in shown
+    )
     return replace(run, timeline=timeline, topics=topics, about=f"{_steps_said(test)}{run.about}")
 
 
 def value_charts(trace: Trace, test: SideOfTest) -> tuple[Chart, ...]:
     """Return charts of topics, those first that the test looked at, of services and actions, and of simulations."""
-    charts = [chart for topic in _topics(trace, test) if (chart := drawn_chart(_values_of(topic), trace))]
+    charts = [chart for topic in _topics(trace, test) if (chart := drawn_chart(_values_of(topic, test), trace))]
     charts += islice(_called(trace), _MOST_CALLED)
     if test.sketches:
         charts.append(picture_of(test.sketches, "Seen from above"))
@@ -62,8 +65,15 @@ def value_charts(trace: Trace, test: SideOfTest) -> tuple[Chart, ...]:
     return tuple(found)
 
 
-def _values_of(topic: str) -> Drawing:
-    return Drawing((Plot(topic),), came="published by the test on")
+def _values_of(topic: str, test: SideOfTest) -> Drawing:
+    return Drawing((Plot(topic),), came=f"published by the {_sender(topic, test)} on")
+
+
+def _sender(topic: str, test: SideOfTest) -> str:
+    """Return who has published what programs did not: the test, or a simulation that it lets take part."""
+    publishers = (end for _, end in test.ends if isinstance(end, Endpoint) and end.kind == "publisher")
+    nodes = (end.node for end in publishers if end.topic == topic)
+    return next(nodes, SIDES_OF_TEST["grader"]).removeprefix("the ")
 
 
 def shown_steps(test: SideOfTest, failing: str) -> tuple[ShownStep, ...]:
@@ -136,13 +146,13 @@ def _topics(trace: Trace, test: SideOfTest) -> Iterator[str]:
     return islice(dict.fromkeys((*looked_at, *small)), _MOST_TOPICS)
 
 
-def _messages(trace: Trace) -> Iterator[Panel]:
+def _messages(trace: Trace, test: SideOfTest) -> Iterator[Panel]:
     """Yield a panel with the time of each message, a row for each topic, if there are any."""
     lanes = Lanes()
     for topic, found in islice(_sent(trace).items(), _MOST_ROWS):
         lanes.add(topic)
         for kind, name, tone in (
-            (Delivery, "message of the test", Tone.SECOND),
+            (Delivery, f"message of the {_sender(topic, test)}", Tone.SECOND),
             (Message, "message of a program", Tone.MAIN),
         ):
             lanes.dots(name, ((one.t_ns, "") for one in found if isinstance(one, kind)), tone)

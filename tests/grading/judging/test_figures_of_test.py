@@ -101,6 +101,26 @@ def test_values_are_drawn_first_of_what_the_test_looked_at() -> None:
     assert {(m.x, m.label, m.tone) for chart in charts for m in chart.moments} == {(3.5, "line 8 failed", Tone.BAD)}
 
 
+def test_what_a_simulation_publishes_is_told_as_its_own() -> None:
+    """In the title of its chart, beside its dots, and in the player."""
+    side = replace(SIDE, ends=((0, Endpoint("publisher", "/a", FLOAT32, "simulation", -1, "reliable", "volatile")),))
+    played = played_test(trace(), side, [])
+    assert "Messages published by the simulation on /a" in [chart.title for chart in value_charts(trace(), side)]
+    assert [series.name for series in panels(played.timeline.panels)["messages"].series] == [
+        "message of the simulation", "message of a program"
+    ]  # fmt: skip
+    assert {topic.topic: topic.sender for topic in played.topics} == {"/a": "simulation", "/b": "program"}
+
+
+def test_topics_of_actions_are_not_told_in_words_either() -> None:
+    """The action is: the words say what the picture shows."""
+    rec = run().endpoint("publisher", "/go/_action/status", "S", node="/node")
+    rec.service("service", "/go/_action/send_goal", "G_SendGoal", node="/node")
+    about = played_test(rec.trace(), SIDE, []).about
+    assert "/node serves /go" in about
+    assert "_action" not in about
+
+
 def test_images_and_topics_of_actions_have_no_chart_of_values() -> None:
     """Of large messages only the times are shown; goals and feedback are in the chart of their action."""
     large = [Message(k, "/image", "sensor_msgs/msg/Image", {"width": k}, b"0" * 100_000) for k in range(3)]
