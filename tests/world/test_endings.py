@@ -107,9 +107,7 @@ def test_the_last_one_leaves_as_well(ros: World, write: Callable[[str, str], str
 
 
 @pytest.mark.parametrize("ending", FAREWELL.values(), ids=FAREWELL)
-def test_the_last_one_leaves_when_it_ends_by_itself(
-    ros: World, write: Callable[[str, str], str], ending: str
-) -> None:
+def test_the_last_one_leaves_when_it_ends_by_itself(ros: World, write: Callable[[str, str], str], ending: str) -> None:
     """At the moment at which its program ends."""
     program = ros.run(write("alone", TICKER.format(ending)))
     ros.advance(2.5)
