@@ -182,9 +182,8 @@ def _of_programs(error: BaseException, world: World | None) -> dict[str, Any] | 
         return {"reason": world.full}
     if isinstance(error, NotHandedIn):
         return {"missing": [error.name]}
-    if isinstance(error, ProgramFailed):
-        fault = None if error.fault is None else observation_to_json(error.fault)
-        return {"reason": str(error).rpartition("\n")[2], "fault": fault}
+    if isinstance(error, ProgramFailed) and error.fault is not None:
+        return {"reason": error.fault.text, "fault": observation_to_json(error.fault)}
     if isinstance(error, (StepTimeout, NoMessage)):
         return {"reason": error.reason, "hint": error.hint}
     if isinstance(error, WrongType):
