@@ -116,5 +116,5 @@ def test_a_folder_whose_name_begins_as_that_of_the_grader_is_none_of_its_own() -
     """The line of a step is the one of the test there."""
     log = CallLog(lambda: 0)
     test = f"{Path(grader.__file__).parent}_exercises/test_it.py"
-    exec(compile("\n\nstep()", test, "exec"), {"step": log.noting("step", lambda: None)})
+    exec(compile("\n\nstep()", test, "exec"), {"step": log.noting("step", list)})
     assert [(call.file, call.line) for call in log.calls] == [(test, 3)]
