@@ -12,6 +12,7 @@ from grader.grading.judging.diagnosis.wiring import (
     constant_value,
     given_leaf,
     goes_to,
+    has_threads,
     made,
     names_called,
     number_in_code,
@@ -29,15 +30,17 @@ from grader.grading.judging.service_calls import calls_of
 from grader.grading.judging.source import Function, Source, argument, chain, first_line, last_name, subtree
 from grader.grading.judging.values import EXACT
 from grader.grading.model.exercise import ProblemKind
-from grader.grading.model.wording import number, quote
+from grader.grading.model.wording import nearest, number, quote
 from grader.runtime.model.quantities import seconds
 
 #: The checks of a client, by their names in rubrics.
 _CHECKS = ("sends_goals", "after_goal", "cancels_goal")
-_THREADS = {"Thread", "start_new_thread", "ThreadPoolExecutor", "MultiThreadedExecutor"}
 #: What sends a goal, at once or in time.
 _SENDS = ("send_goal_async", "send_goal")
 _WAITS = ("wait_for_server", "server_is_ready")
+#: What ends a timer.
+_ENDS = {"cancel", "destroy_timer", "destroy"}
+_CANCELS = {"cancel_goal_async", "cancel_goal"}
 _ORDERS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
@@ -51,14 +54,16 @@ _ORDERS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
 def _other_action(case: Case) -> Clue | None:
     """A client of an action has another name."""
     source, wanted = case.source, case.check.action
-    for call in source.calls("ActionClient"):
-        name = argument(call, 2, "action_name")
-        written = text_in_code(source, name)
-        if written is not None and not goes_to(written, wanted):
-            origin = text_origin(source, name, call)
-            hint = f"{source.code(call)} asks for {quote(written, 60)}: the task asks for {wanted}"
-            return Clue(hint, source.place(origin), key=f"action:{source.file}:{call.lineno}")
-    return None
+    clients = {text_in_code(source, argument(c, 2, "action_name")): c for c in source.calls("ActionClient")}
+    names = [name for name in clients if name is not None]
+    # of several, the others may be meant for other actions
+    written = names[0] if len(clients) == 1 and names else nearest(wanted, names)
+    if written is None or any(goes_to(name, wanted) for name in names):
+        return None
+    call = clients[written]
+    origin = text_origin(source, argument(call, 2, "action_name"), call)
+    hint = f"{source.code(call)} asks for {quote(written, 60)}: the task asks for {wanted}"
+    return Clue(hint, source.place(origin), key=f"action:{source.file}:{call.lineno}")
 
 
 @hint_rule(*_CHECKS, problem=ProblemKind.SILENT, priority=3520)
@@ -78,7 +83,7 @@ def _no_goal_sent(case: Case) -> Clue | None:
         own = "self." if source.is_method(unused[0]) else ""
         hint = f"nothing calls {unused[0].name}, which sends the goal: call {own}{unused[0].name}()"
         return Clue(hint, source.place(unused[0]), key="no_goal")
-    if any(last_name(n) in _WAITS for n in source.names()):
+    if any(last_name(n) in _WAITS for n in source.names()) or all(conditions(source, call) for call in sends):
         return None
     hint = f"the server may not be there yet, and the goal is lost then: call {target_of(source, client) or 'client'}"
     return Clue(f"{hint}.wait_for_server() before {source.code(sends[0], 50)}", source.place(sends[0]), key="no_goal")
@@ -88,7 +93,7 @@ def _no_goal_sent(case: Case) -> Clue | None:
 def _waits_for_a_goal(case: Case) -> Clue | None:
     """A callback waits for what can only arrive once it has returned, or nobody spins while a goal is sent."""
     source = case.source
-    if {last_name(n) for n in source.names()} & _THREADS or not any(source.calls("ActionClient")):
+    if has_threads(source) or not any(source.calls("ActionClient")):
         return None
     inside = {node for function in source.called_back() for node in subtree(function)}
     clients = {target_of(source, call) for call in source.calls("ActionClient")} - {""}
@@ -118,7 +123,7 @@ def _waits_for_a_goal(case: Case) -> Clue | None:
 def _timer_never_ends(case: Case) -> Clue | None:
     """A timer that a callback starts sends a goal each time."""
     source = case.source
-    if any(source.calls("cancel", "destroy_timer", "destroy", "reset")):
+    if any(source.calls(*_ENDS, "reset")):
         return None
     inside = {node for function in source.called_back() for node in subtree(function)}
     for item in made(source, "timer"):
@@ -136,10 +141,13 @@ def _timer_never_ends(case: Case) -> Clue | None:
 def _goal_timer_too_slow(case: Case) -> Clue | None:
     """The timer that sends the next goal has a longer period than the time for it."""
     source, within_s = case.source, seconds(case.check.within)
+    inside = {node for function in source.called_back() for node in subtree(function)}
     for item in made(source, "timer"):
         worth = constant_value(source, item.period)
-        sends = any(isinstance(n, ast.Call) and last_name(n.func) in _SENDS for n in runs(source, item))
-        if worth is not None and worth.value > within_s and sends:
+        called = {last_name(n.func) for n in runs(source, item) if isinstance(n, ast.Call)}
+        if item.call not in inside and called & _ENDS:  # it sends the first goal only
+            continue
+        if worth is not None and worth.value > within_s and called & {*_SENDS}:
             hint = f"{timer_code(source, item)} waits {number(worth.value)} s, and the period is in seconds: the next "
             hint += f"goal has to come within {number(within_s)} s"
             return Clue(hint, source.place(worth.origin), key=f"timer:{first_line(item.call)}")
@@ -211,7 +219,7 @@ def _goal_field(case: Case) -> Clue | None:
         return None
     leaf, wanted = facts.path.rpartition(".")[2], facts.wanted
     shown = f'"{quote(wanted, 40)}"' if isinstance(wanted, str) else number(wanted)
-    given = given_leaf(source, leaf)
+    given = [node for node in given_leaf(source, leaf) if _may_set(node, facts.path)]
     named = [dotted for dotted in source.stored if dotted.endswith(f".{leaf}")]
     if not given and not named and not any(literal == leaf for literal in _texts(source)):
         goal = next((c for c in source.calls("Goal") if isinstance(c.func, ast.Attribute)), None)
@@ -232,6 +240,14 @@ def _goal_field(case: Case) -> Clue | None:
     return Clue(hint, source.place(given[0]))
 
 
+def _may_set(node: ast.AST, path: str) -> bool:
+    """Return whether an assignment or argument may set a field of a goal, and not one of another message."""
+    if not isinstance(node, ast.Assign):
+        return True
+    dotted = [chain(target).removeprefix("self.").split(".") for target in node.targets]
+    return any(f".{path}".endswith(f".{'.'.join(parts[1:])}") for parts in dotted)
+
+
 def _texts(source: Source) -> set[object]:
     return {n.value for n in source.all(ast.Constant) if isinstance(n.value, str)}
 
@@ -240,13 +256,13 @@ def _texts(source: Source) -> set[object]:
 def _cancels_at_another_number(case: Case) -> Clue | None:
     """The condition to cancel does not hold for the number from which on the goal has to be cancelled."""
     source = case.source
-    if not any(last_name(n) in ("cancel_goal_async", "cancel_goal") for n in source.names()):
-        return None
+    tests = [test for test in source.all(ast.If) if names_called(source, test.body) & _CANCELS]
+    needed = [node for test in tests for node in _comparisons(source, test.test)]
     for path, wanted in case.check.when.items():
         leaf = path.rpartition(".")[2]
         if not isinstance(wanted, (int, float)) or isinstance(wanted, bool):
             continue
-        for node in source.all(ast.Compare):
+        for node in needed:
             limit = constant_value(source, node.comparators[0])
             holds = _ORDERS.get(type(node.ops[0]))
             if len(node.ops) > 1 or limit is None or holds is None or _leaf_of(source, node.left) != leaf:
@@ -257,6 +273,14 @@ def _cancels_at_another_number(case: Case) -> Clue | None:
                 hint += ": write >= in place of >" if strict else ", from which on the goal has to be cancelled"
                 return Clue(hint, source.place(node), key=f"cancel:{first_line(node)}")
     return None
+
+
+def _comparisons(source: Source, test: ast.expr) -> list[ast.Compare]:
+    """Return the comparisons that all have to be true for a condition."""
+    found = value_of(source, test)
+    if isinstance(found, ast.BoolOp) and isinstance(found.op, ast.And):
+        return [node for value in found.values for node in _comparisons(source, value)]
+    return [found] if isinstance(found, ast.Compare) else []
 
 
 def _leaf_of(source: Source, node: ast.expr) -> str:

@@ -10,6 +10,7 @@ from grader.grading.judging.diagnosis.wiring import (
     callback_nodes,
     elsewhere_because,
     goes_to,
+    has_threads,
     names_called,
     reached,
     roots,
@@ -35,7 +36,6 @@ from grader.grading.model.exercise import ProblemKind, roles_of, texts_under
 from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 
-_THREADS = {"Thread", "start_new_thread", "ThreadPoolExecutor"}
 #: What waits for a future, or asks whether it is done.
 _WAITS = {*SPINS, "wait", "done", "add_done_callback", "wait_for_future"}
 
@@ -156,7 +156,7 @@ def _synchronous_call(case: Case) -> Clue | None:
         if call in callback_nodes(source) and not (grouped and "MultiThreadedExecutor" in names):
             hint = f"{code} waits in a callback for a response that can only arrive after the callback returns"
             return Clue(f"{hint}: use call_async and add_done_callback", source.place(call), key="waits_in_callback")
-        if not names & {*_THREADS, "MultiThreadedExecutor"}:
+        if not has_threads(source):
             hint = f"{code} waits forever: nothing spins the node meanwhile; use call_async, "
             return Clue(f"{hint}then {spin_for(source, call)}", source.place(call), key="unspun")
     return None
@@ -180,7 +180,7 @@ def _spins_in_callback(case: Case) -> Clue | None:
 def _future_never_done(case: Case) -> Clue | None:
     """A loop asks whether a future is done, and nothing spins the node meanwhile."""
     source = case.source
-    if {last_name(n) for n in source.names()} & {*_THREADS, "MultiThreadedExecutor"}:
+    if has_threads(source):
         return None
     for loop in source.all(ast.While):
         asked = [n.func for n in ast.walk(loop.test) if isinstance(n, ast.Call) and last_name(n.func) == "done"]

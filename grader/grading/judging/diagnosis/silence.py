@@ -22,6 +22,7 @@ from grader.grading.judging.diagnosis.wiring import (
     conditions,
     constant_value,
     elsewhere_because,
+    has_threads,
     head_of,
     is_flag,
     is_log,
@@ -68,7 +69,6 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds
 from grader.runtime.model.trace import first_unmet, unusual_request
 
-_THREADS = {"Thread", "MultiThreadedExecutor", "start_new_thread", "ThreadPoolExecutor"}
 _COMMENTED_TIMER = re.compile(r"^\s*#.*\bcreate_timer\s*\(")
 #: What follows from a request that an ordinary publisher does not meet.
 _ONLY_SAME = "it receives only from publishers that offer the same: remove it"
@@ -564,9 +564,8 @@ def _unwoken_rate(unseen: _Unseen) -> Clue | None:
     """`rate.sleep()` returns only if another thread spins the node."""
     source = unseen.source
     rate = next(source.calls("create_rate"), None)
-    names = {last_name(n) for n in source.names()}
     sleeps = [c for c in source.calls("sleep") if not c.args and not c.keywords]
-    if rate is None or not sleeps or names & _THREADS:
+    if rate is None or not sleeps or has_threads(source):
         return None
     hint = f"{source.code(sleeps[0])} waits forever, as only another thread that spins the node wakes a rate"
     return Clue(f"{hint}: use create_timer instead", source.place(sleeps[0]), key="unwoken_rate")

@@ -14,6 +14,7 @@ from grader.grading.judging.diagnosis.wiring import (
     Made,
     given_leaf,
     goes_to,
+    has_threads,
     made,
     made_for,
     number_in_code,
@@ -156,6 +157,8 @@ def _robot_waits(case: Case) -> Clue | None:
     if not _is_told(case):
         return None
     for source in case.sources.values():
+        if has_threads(source):
+            continue
         for pause in pauses(source):
             periods = [_period_s(case, m) for m in made(source, "subscription") if pause.call in runs(source, m)]
             periods += [number_in_code(source, m.period) or 0.0 for m in made(source, "timer")]

@@ -543,6 +543,15 @@ def head_of(source: Source, loop: Loop) -> str:
     return f"for {source.code(loop.target, 20)} in {source.code(loop.iter, 40)}"
 
 
+#: What runs callbacks beside each other, or code beside the callbacks.
+_THREADS = {"Thread", "start_new_thread", "ThreadPoolExecutor", "MultiThreadedExecutor"}
+
+
+def has_threads(source: Source) -> bool:
+    """Return whether a program has threads, so that a callback that waits does not hold up all others."""
+    return any(last_name(n) in _THREADS for n in source.names())
+
+
 def spins(source: Source) -> list[ast.AST]:
     """Return the places that name a spinning function, called or passed to a thread."""
     return [n for n in source.names() if last_name(n) in SPINS]

@@ -195,3 +195,73 @@ def test_a_condition_to_cancel_is_tried_with_the_number_of_the_task() -> None:
         told[condition] = clue("cancels_at_another_number", "cancels_goal", recording, text, **check)
     assert [condition for condition, hint in told.items() if hint] == ["number > MOST", "number == 4"]
     assert told["number > MOST"].endswith("is not true yet for number 3: write >= in place of >")
+
+
+def test_of_several_clients_the_one_with_a_similar_name_is_told() -> None:
+    """The others may be meant for other actions; with no similar name, none is told."""
+    other = '        self.other = ActionClient(self, Dock, "dock")\n        self.client = '
+    recording = without_goals("/counts/_action/send_goal")
+    for wrong, told in (("counts", "6: ActionClient(self, Fibonacci, "), ("fibonacci", "")):
+        text = RIGHT.replace("        self.client = ", other).replace('"count"', f'"{wrong}"')
+        assert clue("other_action", "sends_goals", recording, text)[: len(told) or None] == told
+
+
+#: A rule, its check with parameters, a recording, and a program that fails for another reason.
+SIBLINGS: dict[str, tuple[str, str, dict[str, Any], Client, str]] = {
+    "a goal waits for a condition": (
+        "no_goal_sent",
+        "sends_goals",
+        {},
+        without_goals(f"{ACTION}/_action/send_goal"),
+        RIGHT.replace(
+            "        self.client.wait_for_server()\n        self.send()\n",
+            "        self.create_timer(1.0, self.send)\n",
+        ).replace("        goal = ", "        if not self.wanted:\n            return\n        goal = "),
+    ),
+    "a timer sends the first goal only": (
+        "goal_timer_too_slow",
+        "after_goal",
+        {"end": "rejected"},
+        client().goal(1, 1, 5, accepted=False),
+        RIGHT.replace("        self.send()\n", "        self.first = self.create_timer(5.0, self.send)\n").replace(
+            "        goal = ", "        self.first.cancel()\n        goal = "
+        ),
+    ),
+    "another message has such a field": (
+        "goal_field",
+        "sends_goals",
+        {"every": {"order": 6}},
+        client().goal(1, 1, 5),
+        RIGHT.replace("goal.order = 5", "goal.order, self.last = self.wanted()\n        tune.score.order = 2"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SIBLINGS)
+def test_what_only_resembles_a_mistake_is_not_blamed(name: str) -> None:
+    """The program is wrong elsewhere, and the hint would lead away from it."""
+    rule, check, parameters, recording, text = SIBLINGS[name]
+    assert clue(rule, check, recording, text, **parameters) == ""
+
+
+#: What a callback does that cancels right, or at another number, which the second word tells.
+CANCELS = {
+    "if number < 3:\n            return\n        self.handle.cancel_goal_async()": "",
+    "if not number < 3:\n            self.handle.cancel_goal_async()": "",
+    "if number > 4:\n            self.tell()\n        if number >= 3:\n            self.handle.cancel_goal_async()": "",
+    "if number == 0:\n            self.tell()\n        elif number >= 3:\n            self.give_up()": "",
+    "if number > 3 and self.handle:\n            self.give_up()": "number > 3",
+    "late = number > 3\n        if late:\n            self.give_up()": "number > 3",
+}
+
+
+@pytest.mark.parametrize("does", CANCELS)
+def test_only_a_condition_to_cancel_is_tried(does: str) -> None:
+    """Not one that leads to something else, or that returns."""
+    heard = f"    def heard(self, number):\n        {does}\n"
+    gives_up = "\n    def give_up(self):\n        self.handle.cancel_goal_async()\n"
+    recording = client().goal(1, 1, 5)
+    recording.deliver(4, f"{ACTION}/_action/feedback", {"goal_id": {"uuid": [1] * 16}, "feedback": {"number": 3}})
+    text = f"{RIGHT}\n{heard}{gives_up}"
+    found = clue("cancels_at_another_number", "cancels_goal", recording, text, when={"number": 3})
+    assert (CANCELS[does] in found) if CANCELS[does] else found == ""

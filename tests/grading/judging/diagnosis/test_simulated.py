@@ -106,11 +106,12 @@ def test_a_turn_around_another_axis_is_told() -> None:
 
 
 def test_a_callback_that_sleeps_past_the_next_message_is_told() -> None:
-    """A short pause, or one outside of callbacks, is left alone."""
+    """A short pause, one outside of callbacks, or one beside which other callbacks run, is left alone."""
     sleeps = FOLLOWER.replace("/laser", "/scan") + "        time.sleep(0.5)\n"
     assert told("robot_waits", sleeps).startswith("14: time.sleep(0.5) holds up every callback for 0.5 s")
     assert told("robot_waits", sleeps.replace("0.5)\n", "0.05)\n")) == ""
     assert told("robot_waits", FOLLOWER + "\n\ntime.sleep(0.5)\n") == ""
+    assert told("robot_waits", sleeps + "\n\nexecutor = MultiThreadedExecutor()\n") == ""
 
 
 def test_a_value_under_a_misspelled_name_is_told() -> None:
