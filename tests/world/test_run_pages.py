@@ -12,6 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 import grader
+from grader.runtime.steps import Advance
 from grader.world.calls import MOST_CALLS, CallLog
 from grader.world.errors import StepTimeout
 from grader.world.world import World
@@ -100,6 +101,15 @@ def test_of_very_many_calls_the_last_ones_are_kept() -> None:
     assert {(call.name, call.file, call.begin_ns, call.failed) for call in log.calls} == {
         ("outer", str(HERE), 7, False)
     }
+
+
+def test_a_look_at_what_has_happened_is_no_step() -> None:
+    """On the wall clock time passes between two commands, also after the test; to wait for later is a step."""
+    now_ns = 0
+    log = CallLog(lambda: now_ns)
+    for to_ns, now_ns in ((0, 5), (20, 30), (30, 31)):  # noqa: B007 - the log asks for it
+        log.note(Advance(to_ns), {}, [])
+    assert [(call.name, call.begin_ns, call.end_ns) for call in log.calls] == [("wait", 5, 30)]
 
 
 def test_a_call_that_raises_is_noted_and_closed() -> None:
