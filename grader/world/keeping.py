@@ -61,15 +61,13 @@ def keep_failure(folder: Path, facts: Mapping[str, Any]) -> Path:
     return folder / FAILURE
 
 
-def page_of(
-    session: RecordingSession, trace: AssessedTrace, seed: int | None, why: str = "", test: SideOfTest | None = None
-) -> str:
+def page_of(session: RecordingSession, trace: AssessedTrace, seed: int | None, why: str, test: SideOfTest) -> str:
     """Return the page that plays a run, in one file; the arguments are those of `keep`."""
     environment = environment_of(session)
     facts = {} if seed is None else {"seed": str(seed)}
     facts |= {"ROS": f"rclpy {environment.rclpy} ({environment.ros_distro})", "Python": environment.python}
     processes = {o.process: None for o in trace.observations if isinstance(o, (LogRecord, OutputLine, Fault))}
-    test, whole = _with_text(test or SideOfTest()), _whole(trace)
+    test, whole = _with_text(test), _whole(trace)
     run = played_test(whole, test, [*processes])
     failing = "" if test.failed_at is None else linecache.getline(*test.failed_at).strip()
     charts, steps = value_charts(whole, test), shown_steps(test, failing)
