@@ -85,7 +85,7 @@ class CallLog:
         name = _OUTSIDE.get(type(command))
         if name is None or self._is_inside:
             return
-        # To look at what has happened is no step, though time has passed on the wall clock since the last command.
+        # A look at what has happened is not a step, though time has passed on the wall clock since the last command.
         if isinstance(command, Advance) and min(command.to_ns, self._last_ns) <= begin_ns:
             return
         file, line = _place()

@@ -103,8 +103,8 @@ def test_of_very_many_calls_the_last_ones_are_kept() -> None:
     }
 
 
-def test_a_look_at_what_has_happened_is_no_step() -> None:
-    """On the wall clock time passes between two commands, also after the test; to wait for later is a step."""
+def test_a_look_at_what_has_happened_is_not_a_step() -> None:
+    """On the wall clock, time passes between two commands, also after the test; a wait until later is a step."""
     now_ns = 0
     log = CallLog(lambda: now_ns)
     for to_ns, now_ns in ((0, 5), (20, 30), (30, 31)):  # noqa: B007 - the log asks for it
