@@ -28,6 +28,8 @@ from grader.grading.judging.values import (
     as_number,
     as_rule,
     delivered,
+    goal_id,
+    message_at,
     number_path,
     published,
     rules_text,
@@ -552,47 +554,38 @@ def _action_panels(trace: Trace, action: str, sides: Mapping[str, str]) -> tuple
     feedback = answered(trace, f"{action}/_action/feedback")
     lanes = Lanes()
     lanes.add("goal")
-    lanes.dots("goal", ((g.request.t_ns, said_of(_part(g.request.value, "goal"))) for g in goals), Tone.SECOND)
+    lanes.dots("goal", ((g.request.t_ns, said_of(message_at(g.request.value, "goal"))) for g in goals), Tone.SECOND)
     answers = [(g.response.t_ns, g.response.value.get("accepted") is True) for g in goals if g.response]
     lanes.dots("accepted", ((t, "accepted") for t, yes in answers if yes), Tone.MAIN)
     lanes.dots("rejected", ((t, "rejected") for t, yes in answers if not yes), Tone.BAD)
     if feedback:
         lanes.add("feedback")
-        lanes.dots("feedback", ((m.t_ns, said_of(_part(m.value, "feedback"))) for m in feedback), Tone.MAIN)
+        lanes.dots("feedback", ((m.t_ns, said_of(message_at(m.value, "feedback"))) for m in feedback), Tone.MAIN)
     if cancels:
         lanes.add("cancel")
         lanes.dots("cancel", ((c.request.t_ns, "asked to cancel") for c in cancels), Tone.WARNING)
     ended = [r.response for r in results if r.response]
     lanes.add("result")
-    told = [(r.t_ns, f"{status_of(r)}: {said_of(_part(r.value, 'result'))}") for r in ended]
+    told = [(r.t_ns, f"{status_of(r)}: {said_of(message_at(r.value, 'result'))}") for r in ended]
     lanes.dots("result", told, Tone.THIRD)
     said = f"{counted(len(goals), 'goal')} of the {sides[asker]} for {action}, "
     said += f"{counted(len(feedback), 'message')} of feedback, "
     said += f"{counted(len(cancels), 'request')} to cancel, {counted(len(ended), 'result')}."
-    numbers = _only_values(Plot(action), [(m.t_ns, _part(m.value, "feedback")) for m in feedback], "feedback")
+    numbers = _only_values(Plot(action), [(m.t_ns, message_at(m.value, "feedback")) for m in feedback], "feedback")
     return [(lanes.panel(action), said), *numbers], _goal_cases(trace, goals, results)
 
 
 def _goal_cases(trace: Trace, goals: Sequence[Call], results: Sequence[Call]) -> list[Stretch]:
-    ends = {str(_uuid(r.request.value)): r.response for r in results if r.response}
+    ends = {goal_id(r.request.value): r.response for r in results if r.response}
     cases = []
     for place, goal in enumerate(goals, 1):
-        end = ends.get(str(_uuid(goal.request.value)))
+        end = ends.get(goal_id(goal.request.value))
         stop_ns = trace.stop_ns if end is None else end.t_ns
         accepted = goal.response is not None and goal.response.value.get("accepted") is True
         how = status_of(end) if end is not None else "no result" if accepted else "not accepted"
         if accepted:
             cases.append(drawn_case(goal.request.t_ns, stop_ns, f"goal {place}: {how}"))
     return cases
-
-
-def _uuid(value: Mapping[str, object]) -> object:
-    return value_at(value, "goal_id.uuid")
-
-
-def _part(value: Mapping[str, object], name: str) -> Mapping[str, object]:
-    found = value.get(name)
-    return found if isinstance(found, Mapping) else {}
 
 
 def said_of(value: Mapping[str, object]) -> str:

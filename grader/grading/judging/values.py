@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -200,6 +201,17 @@ def value_at(value: Mapping[str, object], path: str, default: object = None) -> 
         return at_path(value, path)
     except NoSuchField:
         return default
+
+
+def message_at(value: Mapping[str, object], path: str) -> Mapping[str, object]:
+    """Return the message at a path, or an empty one if there is none."""
+    found = value_at(value, path)
+    return found if isinstance(found, Mapping) else {}
+
+
+def goal_id(value: Mapping[str, object], path: str = "goal_id") -> str:
+    """Return the id at a path in a message or call of an action, as text that can be compared."""
+    return json.dumps(value_at(value, f"{path}.uuid"), default=str)
 
 
 def number_at(value: Mapping[str, object], path: str) -> float | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
@@ -22,12 +21,12 @@ from grader.grading.judging.plots import Drawing
 from grader.grading.judging.service_calls import LATENESS_NS, Call, calls_of, calls_of_node, status_of
 from grader.grading.judging.values import (
     JITTER_NS,
-    NoSuchField,
     RuleOrValue,
     as_number,
-    at_path,
     breach,
     broken_rules,
+    goal_id,
+    message_at,
     published,
     rules_text,
     shown_value,
@@ -95,7 +94,7 @@ class ActionResult:
         if not accepted:
             return f"rejected, expected that it {_ends(self.status)}", "accept the goal: GoalResponse.ACCEPT"
         # By the id: results come in the order in which goals end, not in which they were sent.
-        mine = next((r for r in results if _goal_id(r.request.value) == _goal_id(goal.request.value)), None)
+        mine = next((r for r in results if goal_id(r.request.value) == goal_id(goal.request.value)), None)
         if mine is None or mine.response is None:
             running = self.within is not None and goal.request.t_ns + self.within >= trace.stop_ns
             # The request for the result was sent, so the server had accepted; it may still be at work.
@@ -163,7 +162,7 @@ class ActionFeedback:
         messages = published(trace, f"{self.action}/_action/feedback")
         counts = []
         for place, goal in enumerate(accepted, 1):
-            mine = [m for m in messages if _goal_id(m.value) == _goal_id(goal.request.value)]
+            mine = [m for m in messages if goal_id(m.value) == goal_id(goal.request.value)]
             counts.append(len(mine))
             # In this order: without messages there is no content, and with wrong content the pace does not matter.
             flaw = self._count_flaw(mine) or self._content_flaw(mine) or self._pace_flaw(mine)
@@ -193,9 +192,9 @@ class ActionFeedback:
 
     def _content_flaw(self, mine: Sequence[Message]) -> str:
         for message in mine:
-            wrong = broken_rules(_feedback(message), self.fields)
+            wrong = broken_rules(message_at(message.value, "feedback"), self.fields)
             if wrong:
-                flaw = breach(_feedback(message), wrong[0], self.fields[wrong[0]])
+                flaw = breach(message_at(message.value, "feedback"), wrong[0], self.fields[wrong[0]])
                 return f"in the feedback at {moment(message.t_ns)} {flaw}"
         if self.grows is None:
             return ""
@@ -223,20 +222,8 @@ def _ends(status: str) -> str:
     return {"succeeded": "succeeds", "canceled": "is canceled", "aborted": "aborts"}.get(status, status)
 
 
-def _goal_id(value: Mapping[str, object]) -> str:
-    try:
-        return json.dumps(at_path(value, "goal_id.uuid"), default=str)
-    except NoSuchField:
-        return ""
-
-
-def _feedback(message: Message) -> Mapping[str, object]:
-    found = message.value.get("feedback")
-    return found if isinstance(found, Mapping) else {}
-
-
 def _held(message: Message, path: str) -> Any:
-    return value_at(_feedback(message), path)
+    return value_at(message_at(message.value, "feedback"), path)
 
 
 def _size(message: Message, path: str | None) -> float | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
@@ -12,7 +11,16 @@ from typing import Annotated, Any, ClassVar, Literal
 from grader.grading.judging.facts import GoalFieldFacts
 from grader.grading.judging.findings import explain_fault, faulted, first_fault, met, not_met, observed
 from grader.grading.judging.service_calls import LATENESS_NS, Call, calls_of, status_of
-from grader.grading.judging.values import JITTER_NS, RuleOrValue, breach, broken_rules, delivered, rules_text, value_at
+from grader.grading.judging.values import (
+    JITTER_NS,
+    RuleOrValue,
+    breach,
+    broken_rules,
+    delivered,
+    goal_id,
+    message_at,
+    rules_text,
+)
 from grader.grading.model.exercise import Finding, ProblemKind
 from grader.grading.model.measures import Measure, Reading
 from grader.grading.model.wording import first_few, moment, nearest, number, quote
@@ -57,28 +65,24 @@ def sent_goals(trace: Trace, action: str) -> tuple[SentGoal, ...]:
     """Return the goals that a student's client sends the grader's server, in order."""
     calls = {part: calls_of(trace, f"{action}/_action/{part}", "student") for part in ("send_goal", "get_result")}
     cancels = calls_of(trace, f"{action}/_action/cancel_goal", "student")
-    results = {_uuid(call.request.value, "goal_id"): call for call in calls["get_result"] if call.response is not None}
+    results = {goal_id(call.request.value): call for call in calls["get_result"] if call.response is not None}
     found = []
     for call in calls["send_goal"]:
         end, end_ns = "", trace.stop_ns
-        result = results.get(uuid := _uuid(call.request.value, "goal_id"))
+        result = results.get(uuid := goal_id(call.request.value))
         if call.response is not None and call.response.value.get("accepted") is False:
             end, end_ns = "rejected", call.response.t_ns
         elif result is not None and result.response is not None:
             end, end_ns = status_of(result.response), result.response.t_ns
         # Without an id, a request to cancel is about all goals that run.
-        mine = (c.request for c in cancels if _uuid(c.request.value, "goal_info.goal_id") in (uuid, _EVERY))
+        mine = (c.request for c in cancels if goal_id(c.request.value, "goal_info.goal_id") in (uuid, _EVERY))
         asked = tuple(r.t_ns for r in mine if call.request.t_ns <= r.t_ns)
         found.append(SentGoal(call, end, end_ns, asked))
     return tuple(found)
 
 
 #: The id of no goal.
-_EVERY = json.dumps([0] * 16)
-
-
-def _uuid(value: Mapping[str, object], path: str) -> str:
-    return json.dumps(value_at(value, f"{path}.uuid"), default=str)
+_EVERY = goal_id({"goal_id": {"uuid": [0] * 16}})
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,13 +221,15 @@ class CancelsGoal:
             return None
         since_ns: int | None = goal.call.response.t_ns
         if self.when:
-            uuid = _uuid(goal.call.request.value, "goal_id")
+            uuid = goal_id(goal.call.request.value)
             told = (
                 d
                 for d in delivered(trace, f"{self.action}/_action/feedback")
-                if goal.t_ns <= d.t_ns <= goal.end_ns and _uuid(d.value, "goal_id") == uuid
+                if goal.t_ns <= d.t_ns <= goal.end_ns and goal_id(d.value) == uuid
             )
-            since_ns = next((d.t_ns for d in told if not broken_rules(_feedback(d.value), self.when)), None)
+            since_ns = next(
+                (d.t_ns for d in told if not broken_rules(message_at(d.value, "feedback"), self.when)), None
+            )
         due_ns = None if since_ns is None else since_ns + self.after
         return due_ns if due_ns is not None and due_ns <= goal.end_ns else None
 
@@ -312,11 +318,6 @@ class AfterGoal:
 
 def _took_s(goal: SentGoal, after: SentGoal | None) -> float:
     return math.inf if after is None else seconds(after.t_ns - goal.end_ns)
-
-
-def _feedback(value: Mapping[str, object]) -> Mapping[str, object]:
-    found = value.get("feedback")
-    return found if isinstance(found, Mapping) else {}
 
 
 def _too_few(trace: Trace, what: str, at_least: int, evidence: dict[str, object]) -> Finding:
