@@ -147,7 +147,7 @@ class TopicValues:
 
     topic: str
     type: str
-    sender: str  # `student` or `grader`
+    sender: str  # `student` or `grader`; on the page of a test `program`, `test` or a simulation
     messages: int  # how many there were before thinning
     times_s: tuple[float, ...]  # when each of the kept ones was published, in seconds
     columns: tuple[Column, ...]

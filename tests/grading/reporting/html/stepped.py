@@ -12,8 +12,8 @@ from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import Endpoint, ServiceEnd
 
 
-def page_of_failed_test(text: str = "fine") -> str:
-    """Return a page all of whose texts are the one given."""
+def page_of_failed_test(text: str = "fine", omitted: int = 3) -> str:
+    """Return a page all of whose texts are the one given; so many steps are left out of it."""
     rec = Recording(4, process=text).endpoint("publisher", f"/{text}", FLOAT32, node=f"/{text}").log(1, text, "WARN")
     rec.service("client", f"/add{text}", text, node=f"/{text}")
     for k in range(8):
@@ -30,7 +30,7 @@ def page_of_failed_test(text: str = "fine") -> str:
         (0, Endpoint("publisher", "/a", FLOAT32, "the test", -1, "reliable", "volatile")),
         (NS_PER_S, ServiceEnd("service", f"/add{text}", text, "the test")),
     )
-    side = SideOfTest(calls, 3, ends, (f"/{text}",), (f"/{text}.py", 6))
+    side = SideOfTest(calls, omitted, ends, (f"/{text}",), (f"/{text}.py", 6))
     excerpts = (Excerpt(text, 6, 5, (text, text)),)
     trace, facts = rec.trace(), {"seed": text}
     run, charts, steps = played_test(trace, side, [text]), value_charts(trace, side), shown_steps(side, text)

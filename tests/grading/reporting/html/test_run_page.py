@@ -37,6 +37,7 @@ def test_a_run_has_values_steps_and_the_failing_line() -> None:
     ]
     assert headings[-1] == ("3", "The steps of the test")
     assert "3 earlier steps are left out" in page
+    assert "1 earlier step is left out" in page_of_failed_test(omitted=1)
     (failed,) = re.findall(r"<tr class=meant>(.*?)</tr>", page, re.DOTALL)
     assert re.sub(r"<[^>]+>|\s+", " ", failed).split() == ["0.000", "4.000", "fine.py,", "line", "6", "fine", "failed"]
 
