@@ -16,7 +16,9 @@ from grader.runtime.recording.bag import HINT_ROS_1
 #: What makes a folder with recorded files one recording.
 METADATA = "metadata.yaml"
 #: What to hand in, for a student who has handed in none.
-_ONE = "hand in one recording {}, as `ros2 bag record` makes it: its folder, or its .mcap or .db3 file"
+_ONE = "hand in one recording{}, as `ros2 bag record{}` makes it: its folder, or its {} file"
+#: How a pattern ends that one kind of storage alone fits, and the name that `ros2 bag record` has for this kind.
+_STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
 #: The most other recordings that a missing one is told with.
 _MOST_OTHERS = 12
 
@@ -32,6 +34,11 @@ class FoundBag:
 
     path: str
     files: tuple[str, ...]
+
+    @property
+    def shown(self) -> str:
+        """What messages call it: its path, or the name of a file if the submission itself is the recording."""
+        return self.path if self.path != "." else self.files[-1]
 
     @property
     def names(self) -> Iterator[str]:
@@ -70,7 +77,7 @@ def find_bag(pattern: str, files: Sequence[str], too_large: Sequence[str] = ()) 
     if len(fitting) == 1:
         return StudentFile(pattern, fitting[0].path)
     if fitting:
-        names = listed([printable(bag.path, 80) for bag in fitting[:_MOST_OTHERS]], "and")
+        names = listed([printable(bag.shown, 80) for bag in fitting[:_MOST_OTHERS]], "and")
         problem = f"expected one recording, found {len(fitting)}: {names}"
         return StudentFile(pattern, None, problem=problem, hint="hand in the one that is to be graded, and no other")
     dropped = [file for bag in bags_in(too_large) if _fits(pattern, bag) for file in bag.files]
@@ -78,9 +85,17 @@ def find_bag(pattern: str, files: Sequence[str], too_large: Sequence[str] = ()) 
         return StudentFile(pattern, None, problem=f"{first_of(dropped)} is too large to be read", hint=SMALLER)
     if not bags and (old := [file for file in files if file.casefold().endswith(".bag")]):
         return StudentFile(pattern, None, problem=f"{first_of(old)} is a recording of ROS 1", hint=HINT_ROS_1)
-    others = tuple(bag.path for bag in bags[:_MOST_OTHERS])
-    named = "" if pattern == "*" else f"named {pattern}"
-    return StudentFile(pattern, None, candidates=others, hint=" ".join(_ONE.format(named).split()).replace(" ,", ","))
+    others = tuple(bag.shown for bag in bags[:_MOST_OTHERS])
+    return StudentFile(pattern, None, candidates=others, hint=_hint(pattern))
+
+
+def _hint(pattern: str) -> str:
+    """Return what to hand in, for a student who has handed in no recording that fits."""
+    named = "" if pattern == "*" else f" named {pattern}"
+    for ending, storage in _STORAGES.items():
+        if pattern.casefold().endswith(ending):
+            return _ONE.format(named, f" --storage {storage}", ending)
+    return _ONE.format(named, "", ".mcap or .db3")
 
 
 def _fits(pattern: str, bag: FoundBag) -> bool:

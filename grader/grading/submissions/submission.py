@@ -50,6 +50,7 @@ MAX_CANDIDATES, LIKELY = 12, 0.6
 _NO_NODES = ("__init__.py", "setup.py", "conftest.py")
 
 _EXPECTED = "a folder, a .py file or an archive"
+_EXPECTED_WITH_BAGS = "a folder, a recording, a .py file or an archive"
 
 # Suffixes that browsers, editors and file managers add to a name: `x(1).py`, `x - Copy.py`, `x.py.txt`; and notebooks.
 _EXTENSIONS = re.compile(r"(?:\.(?:txt|bak|orig|old|save|py|ipynb))+$")
@@ -198,7 +199,8 @@ def _every_file_of(source: Path, wanted: Sequence[str], where: str) -> Collected
             raise SubmissionError(f"{where}: expected at most {MAX_FILE_BYTES >> 20} MiB, found more")
         return Collected(((source.name, content),))
     if kind is None and not source.name.casefold().endswith(ARCHIVE_SUFFIXES):
-        raise SubmissionError(f"{where}: expected {_EXPECTED}, found another kind of file", _other_kind(source, wanted))
+        expected = _EXPECTED_WITH_BAGS if limits.bag_bytes else _EXPECTED
+        raise SubmissionError(f"{where}: expected {expected}, found another kind of file", _other_kind(source, wanted))
     return collect_archive(content, where=where, limits=limits)
 
 

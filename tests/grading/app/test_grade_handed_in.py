@@ -121,12 +121,17 @@ def test_another_type_and_another_topic_are_told(one_worker: RecordingSession, t
     assert stands.hint == "publish on /cmd_vel instead of /robot/cmd_vel, and record it"
 
 
+_HAND_IN = (
+    "hand in one recording named *.mcap, as `ros2 bag record --storage mcap` makes it: its folder, or its .mcap file"
+)
+
+
 @pytest.mark.parametrize(
     ("files", "reason", "hint"),
     [
-        ((), "*.mcap: not in the submission", "hand in one recording named *.mcap, as `ros2 bag record` makes it"),
+        ((), "*.mcap: not in the submission", _HAND_IN),
         (("a.mcap", "b.mcap"), "*.mcap: expected one recording, found 2: a.mcap and b.mcap", "hand in the one that"),
-        (("a.db3",), "*.mcap: not in the submission; found a.db3", "hand in one recording named *.mcap"),
+        (("a.db3",), "*.mcap: not in the submission; found a.db3", _HAND_IN),
         (
             ("a.mcap",),
             "*.mcap: a.mcap: expected a complete rosbag2 recording, found a damaged one",

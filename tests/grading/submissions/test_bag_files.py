@@ -68,7 +68,18 @@ def test_a_missing_one_is_told_with_the_pattern_and_with_those_that_are_there() 
     found = find_bag("run*.mcap", FILES)
     assert (found.found, found.problem) == (None, "")
     assert found.candidates == ("bags/square", "loose/circle.db3")
-    assert found.hint.startswith("hand in one recording named run*.mcap, as `ros2 bag record` makes it")
+    assert found.hint == (
+        "hand in one recording named run*.mcap, as `ros2 bag record --storage mcap` makes it: "
+        "its folder, or its .mcap file"
+    )
+
+
+def test_a_submission_that_is_a_recording_of_another_name_is_told_by_its_file() -> None:
+    found = find_bag("*.mcap", ["metadata.yaml", "run_0.db3"])
+    assert (found.found, found.candidates) == (None, ("run_0.db3",))
+    assert find_bag("lap", ["run_0.mcap"]).hint == (
+        "hand in one recording named lap, as `ros2 bag record` makes it: its folder, or its .mcap or .db3 file"
+    )
 
 
 def test_one_of_ros_1_is_told_from_none() -> None:
@@ -105,6 +116,11 @@ def test_a_recording_alone_may_be_the_submission(work: Path, into: Path) -> None
     assert stage_submission(str(work / "run.mcap"), ["*.mcap"], into).files["*.mcap"].found == "run.mcap"
     with pytest.raises(SubmissionError, match="found another kind of file"):
         stage_submission(str(work / "run.mcap"), ["node.py"], into)
+    (work / "metadata.yaml").touch()
+    with pytest.raises(
+        SubmissionError, match=r"expected a folder, a recording, a \.py file or an archive, found another"
+    ):
+        stage_submission(str(work / "metadata.yaml"), ["*.mcap"], into)
 
 
 def test_one_in_an_archive_is_found_as_in_a_folder(work: Path, tmp_path: Path, into: Path) -> None:
