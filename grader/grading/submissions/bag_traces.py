@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
 
@@ -31,6 +32,7 @@ from grader.runtime.model.quantities import KIB, MIB, duration, size
 from grader.runtime.model.scenario import Scenario
 from grader.runtime.model.trace import AssessedTrace, BagContents, ClockKind, Delivery, Message
 from grader.runtime.model.wording import printable
+from grader.runtime.recording.bag import HINT_DAMAGED
 from grader.runtime.recording.packed import trace_from_json
 
 MODULE = "grader.grading.submissions.bag_reader"
@@ -40,6 +42,12 @@ PROCESSOR_S = 60
 #: Memory of the process in bytes: what it needs without a recording, for messages as Python values, and for the
 #: answer; beyond that, twice the size of the recording, which may be packed in one piece.
 MEMORY_BYTES = 1024 * MIB
+#: The most lists and objects in its answer, besides one for every eight bytes of messages: a time is the smallest
+#: message in others. Each takes the grader about 250 bytes, and a recording of some kilobytes may unpack to millions.
+MOST_NESTED = 1_000_000
+_BYTES_OF_ONE = 8
+#: The longest name of a topic or a type.
+_LONGEST_NAME = 255
 #: The most characters of what the process says of a recording that it cannot read.
 _MOST_CHARACTERS = 1_000
 
@@ -94,7 +102,7 @@ def bag_trace(
     assert asked is not None
     files = [file.relative_to(root).as_posix() for file in root.rglob("*") if file.is_file() and not file.is_symlink()]
     bag = next(found for found in bags_in(files) if found.path == path)
-    shown = path if path != "." else Path(bag.files[-1]).name
+    shown = bag.shown
     where, whole = printable(shown), sum((root / file).stat().st_size for file in bag.files)
     if whole > asked.size_bytes:
         found = f"{whole / MIB:,.1f} MiB" if whole >= MIB else f"{whole / KIB:,.1f} KiB"
@@ -143,15 +151,20 @@ def _request(
 def _taken_apart(answer: bytes, code: int, scenario: Scenario, shown: str) -> AssessedTrace | UnreadableBag:
     """Return what the process said, as far as it is one of its answers."""
     where = printable(shown)
+    if answer.count(b"{") + answer.count(b"[") > MOST_NESTED + scenario.limits.traffic_bytes // _BYTES_OF_ONE:
+        return UnreadableBag(f"{where}: reading it takes too much memory", SMALLER)
     try:
         said = json.loads(answer)
         if "problem" in said:
             return UnreadableBag(*(printable(str(said[key]), _MOST_CHARACTERS) for key in ("problem", "hint")))
         trace = trace_from_json(said["trace"])
+        if not _is_sound(trace):
+            raise ValueError("no answer of the reader")
         notes = tuple(_notes([(str(kind), str(topic)) for kind, topic in said["cut"]], scenario, where))
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError, HarnessError):
-        ended = "it takes too long or too much memory" if code == -signal.SIGKILL else f"its reader ended with {code}"
-        return UnreadableBag(f"{where}: expected a recording that can be read, but {ended}", SMALLER)
+        if code == -signal.SIGKILL:
+            return UnreadableBag(f"{where}: reading it takes too long or too much memory", SMALLER)
+        return UnreadableBag(f"{where}: expected a recording, found something else", HINT_DAMAGED)
     # Whatever the process says, it says nothing of the grader.
     return AssessedTrace(
         scenario=scenario.id,
@@ -161,6 +174,21 @@ def _taken_apart(answer: bytes, code: int, scenario: Scenario, shown: str) -> As
         notes=notes,
         bag=replace(trace.bag or BagContents(""), file=shown),
     )
+
+
+def _is_sound(trace: AssessedTrace) -> bool:
+    """Return whether a trace is as the reader makes it: names are names, messages have fields, and times count up."""
+    bag = trace.bag or BagContents("")
+    names = {name for topic, type_, _ in bag.topics for name in (topic, type_)} | {topic for topic, *_ in bag.contents}
+    times = [0]
+    for one in trace.observations:
+        if isinstance(one, (Message, Delivery)):
+            names |= {one.topic, one.type}
+            times.append(one.t_ns)
+            if not isinstance(one.value, Mapping):
+                return False
+    in_order = all(before <= after for before, after in pairwise([*times, trace.stop_ns - 1]))
+    return in_order and all(name.isprintable() and 0 < len(name) <= _LONGEST_NAME for name in names)
 
 
 def _notes(cut: Iterable[tuple[str, str]], scenario: Scenario, where: str) -> Iterator[str]:

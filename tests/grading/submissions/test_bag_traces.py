@@ -410,6 +410,44 @@ class TestBroken:
         assert isinstance(trace, AssessedTrace)
         assert (trace.harness_problem, trace.suspected, trace.marks("limit")) == ("", False, ())
 
+    @pytest.mark.parametrize(
+        ("row", "value"), [(2, "/odom\x1b[31m"), (2, ""), (3, "x" * 256), (1, -1), (1, 2**62), (4, {"float": "nan"})]
+    )
+    def test_an_observation_that_no_reader_makes_is_no_answer(self, tmp_path: Path, row: int, value: object) -> None:
+        """Checks rely on names that are printable, times that count up, and messages with fields."""
+        _storage(tmp_path)
+
+        def tell(request: bytes, limits: Mapping[str, int], files: Sequence[int]) -> tuple[bytes, int]:
+            said = json.loads(in_this_process(request, limits, files)[0])
+            said["trace"]["observations"][30][row] = value
+            return json.dumps(said).encode(), 0
+
+        found = bag_trace(tmp_path, f"bag/{_name(tmp_path)}", ASKED, {}, tell)
+        assert isinstance(found, UnreadableBag)
+        assert found.problem == f"bag/{_name(tmp_path)}: expected a recording, found something else"
+        assert found.hint.startswith("copy or record it again")
+
+    @pytest.mark.sandbox
+    def test_messages_that_take_the_grader_gigabytes_are_not_taken_over(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """A recording of some kilobytes may hold millions of messages in messages."""
+        count = 9_990
+        definition = f"E[] e\n{'=' * 80}\nMSG: nav_msgs/E\nF[] f\n{'=' * 80}\nMSG: nav_msgs/F\nuint8 a\n"
+        with (tmp_path / "bag.mcap").open("wb") as file:
+            writer = McapWriter(file)
+            writer.start("ros2", "test")
+            schema = writer.register_schema(ODOMETRY, "ros2msg", definition.encode())
+            channel = writer.register_channel("/odom", "cdr", schema)
+            for number in range(15):
+                data = b"\0\1\0\0" + count.to_bytes(4, "little") + bytes(4 * count)
+                writer.add_message(channel, number, data, number)
+            writer.finish()  # type: ignore[no-untyped-call]
+        assert (tmp_path / "bag.mcap").stat().st_size < MIB
+        monkeypatch.setattr(bag_traces, "MOST_NESTED", 100_000)
+        found = refused(tmp_path, asked("/odom", limits=Limits(traffic_bytes=MIB)), contained=True)
+        assert found.problem == "bag.mcap: reading it takes too much memory"
+
     @pytest.mark.parametrize("answer", [b"", b"[]", b"{", b'{"trace": {}}', b'{"trace": {}, "cut": 1}', b"null", b"7"])
     def test_no_answer_is_no_failure_of_the_grader(self, tmp_path: Path, answer: bytes) -> None:
         _storage(tmp_path)
