@@ -69,13 +69,13 @@ def first_ray_behind(case: Case) -> Clue | None:
     return Clue(hint, case.source.place(used)) if read else None
 
 
-@hint_rule("stays_in_range")
+@hint_rule("stays_in_range", "field_in_range")
 def silent_while_braking(case: Case) -> Clue | None:
     """Commands are published only while the way is free."""
     calls = publish_calls(case.source)
     tests = [next(iter(conditions(case.source, call)), None) for call in calls]
     test = tests[0] if len(tests) == 1 else None
-    if case.check.topic != "/truth/collisions" or test is None:
+    if case.criterion.id not in ("blind", "hits_nothing") or test is None:
         return None
     hint = f"under 'if {case.source.code(test.test, 50)}' nothing is published otherwise, and a robot goes on as it "
     return Clue(f"{hint}was told last: publish a Twist of zeros too", case.source.place(test))

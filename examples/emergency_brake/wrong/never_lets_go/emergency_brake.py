@@ -37,7 +37,7 @@ class EmergencyBrake(Node):
         command.angular.z = wanted.angular.z
         if 0.0 < self.nearest <= MARGIN + REACTION * wanted.linear.x:
             self.braked = True
-        if not self.braked:
+        if self.nearest > 0.0 and not self.braked:
             command.linear.x = wanted.linear.x
         self.commands.publish(command)
 
