@@ -182,3 +182,19 @@ def brake_is_kept(case: Case) -> Clue | None:
             hint = f"once {name} is True, this line keeps it so: decide again for every command, without '{name} or'"
             return Clue(hint, case.source.place(kept))
     return None
+
+
+@hint_rule("stays_in_range", "field_in_range")
+def passes_on_everything(case: Case) -> Clue | None:
+    """The driver's command itself is published, whatever the scanner sees."""
+    drivers = [item for item in made(case.source, "subscription") if item.type == "Twist"]
+    inside = {node for item in drivers for node in runs(case.source, item)}
+    heard = {node.arg for node in inside if isinstance(node, ast.arg)} - {"self"}
+    sent = [call for call in publish_calls(case.source) if call in inside and call.args]
+    changed = [node for node in inside if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)]
+    if case.criterion.id not in ("blind", "hits_nothing") or len(sent) != 1 or chain(sent[0].args[0]) not in heard:
+        return None
+    if any(conditions(case.source, sent[0])) or any(chain(c).startswith(f"{chain(sent[0].args[0])}.") for c in changed):
+        return None
+    hint = f"{case.source.code(sent[0])} passes on what the driver wants, whatever is in the way: publish a command"
+    return Clue(f"{hint} of your own", case.source.place(sent[0]))

@@ -72,3 +72,29 @@ def cancel_forgotten(case: Case) -> Clue | None:
         hint = "nothing cancels the goal: call cancel_goal_async of its goal handle here"
         return Clue(hint, case.source.place(branch))
     return None
+
+
+@hint_rule("sends_goals")
+def rejected_place_is_skipped(case: Case) -> Clue | None:
+    """A rejected goal moves on to the next place, as a result does."""
+    for branch in branches(case, "accepted"):
+        counted = [node for part in branch.body for node in ast.walk(part) if isinstance(node, ast.AugAssign)]
+        if case.check.goals and counted and isinstance(branch.test, ast.UnaryOp):
+            hint = f"{case.source.code(counted[0])} skips a place that was rejected: send the same one again"
+            return Clue(hint, case.source.place(counted[0]))
+    return None
+
+
+@hint_rule("sends_goals")
+def begins_at_another_place(case: Case) -> Clue | None:
+    """The number of the place does not begin at 0."""
+    indexed = [node for node in case.source.all(ast.Subscript) if named(node.value, "PLACES")]
+    if not case.check.goals or len(indexed) != 1:
+        return None
+    stores = case.source.stored.get(case.source.code(indexed[0].slice), ())
+    first = case.source.parents.get(stores[0]) if stores else None
+    begins = first.value.value if isinstance(first, ast.Assign) and isinstance(first.value, ast.Constant) else 0
+    if isinstance(begins, bool) or not isinstance(begins, int) or begins == 0:
+        return None
+    hint = f"{case.source.code(first)}: the first place is number 0 of PLACES"
+    return Clue(hint, case.source.place(first))

@@ -4,12 +4,14 @@ import ast
 import math
 
 from grader.api import Case, Clue, hint_rule
-from grader.api.unstable import constant_value, given_leaf, last_name, names_in
+from grader.api.unstable import constant_value, given_leaf, last_name
 
 #: More than a full turn is no angle in radians.
 FULL_TURN = 2 * math.pi
 #: What is too near the wall for certain, and what is too far away.
 NEAR, FAR = 0.4, 0.6
+#: A robot that follows a wall on its left looks from ahead on the right to behind on the left, in degrees.
+LEAST, MOST = -60, 150
 #: A turn rate that is no accident, in rad/s.
 TURNS = 0.1
 #: So many commands in moments that leave no doubt, and so large a share of them, tell that the sign is wrong.
@@ -24,6 +26,49 @@ def names(case: Case) -> set[str | None]:
 def ranges_read(case: Case) -> list[ast.Attribute]:
     """Return the places that read the ranges of a scan."""
     return [node for node in case.source.all(ast.Attribute) if node.attr == "ranges"]
+
+
+@hint_rule("field_in_range")
+def faster_than_allowed(case: Case) -> Clue | None:
+    """The speed is a number above the limit."""
+    for given in given_leaf(case.source, "x"):
+        if case.check.field != "linear.x" or "linear" not in case.source.code(given):
+            continue
+        for factor in factors(given.value):
+            found = constant_value(case.source, factor)
+            if found is not None and abs(found.value) > case.check.high:
+                hint = f"{case.source.code(factor, 30)} is {found.value:g} m/s, and at most {case.check.high:g} m/s is"
+                return Clue(f"{hint} allowed: make it less", case.source.place(found.origin))
+    return None
+
+
+def factors(node: ast.expr) -> list[ast.expr]:
+    """Return what is multiplied in an expression."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
+        return [*factors(node.left), *factors(node.right)]
+    return [node]
+
+
+@hint_rule("stays_in_range")
+def ray_by_number(case: Case) -> Clue | None:
+    """A ray is chosen by its number, as if another one were the first, and looks away from the wall and the way."""
+    scans = case.trace.deliveries("/scan")
+    if case.check.topic not in ("/truth/clearance", "/truth/odometry") or not scans:
+        return None
+    scan = scans[0].value
+    for node in case.source.all(ast.Subscript):
+        found = constant_value(case.source, node.slice) if last_name(node.value) == "ranges" else None
+        if found is None or not -len(scan["ranges"]) <= found.value < len(scan["ranges"]):
+            continue
+        number = int(found.value) % len(scan["ranges"])
+        angle = math.degrees(scan["angle_min"] + number * scan["angle_increment"])
+        if not LEAST <= angle <= MOST:
+            side = "left" if angle > 0 else "right"
+            hint = (
+                f"{case.source.code(node, 40)} looks {abs(angle):.0f}° to the {side} here, where no wall is to follow"
+            )
+            return Clue(f"{hint}: choose rays by angle_min + k * angle_increment", case.source.place(node))
+    return None
 
 
 @hint_rule("stays_in_range")

@@ -304,3 +304,35 @@ def _message_name(function: Function) -> str:
     """Return what a callback calls the message that it receives; empty if the text does not show it."""
     names = [a.arg for a in (*function.args.posonlyargs, *function.args.args) if a.arg != "self"]
     return names[0] if len(names) == 1 else ""
+
+
+@crash_rule(
+    r"^AttributeError: 'ActionClient' object has no attribute '(cancel_goal|get_result)(_async)?'", priority=3610
+)
+def _of_the_goal_handle(crash: Crash) -> Clue | None:
+    """What a goal handle does is asked of the client."""
+    name = f"{crash.found[1]}{crash.found[2] or ''}"
+    return Clue(f"{name} is a method of the goal handle, which send_goal_async gives: call it on that")
+
+
+@crash_rule(r"^AttributeError: '(\w+)_Result' object has no attribute 'status'", priority=3620)
+def _status_beside_result(crash: Crash) -> Clue | None:
+    """The status of a goal stands beside its result."""
+    read = next((n for n in crash.source.on_line(crash.line, ast.Attribute) if n.attr == "status"), None)
+    inner = read.value if read is not None else None
+    if isinstance(inner, ast.Attribute) and inner.attr == "result":
+        return Clue(f"the status is beside the result: write {crash.source.code(inner.value, 40)}.status")
+    return Clue("the status is beside the result, in what the future of get_result_async gives")
+
+
+@hint_rule("after_goal", "cancels_goal", priority=3630)
+def _sleeps_before_a_goal(case: Case) -> Clue | None:
+    """A callback sleeps for longer than there is time to react."""
+    source = case.source
+    inside = {node for function in source.called_back() for node in subtree(function)}
+    for call in source.calling("time.sleep"):
+        worth = number_in_code(source, argument(call, 0, "secs"))
+        if call in inside and worth is not None and worth > seconds(case.check.within):
+            hint = f"{source.code(call, 40)} holds up every callback for {number(worth)} s, and there are"
+            return Clue(f"{hint} {number(seconds(case.check.within))} s to react: use a timer", source.place(call))
+    return None

@@ -154,7 +154,7 @@ def _is_field(node: ast.AST, path: str) -> bool:
 @hint_rule(priority=8310)
 def _robot_waits(case: Case) -> Clue | None:
     """A callback sleeps for longer than it takes until the next message, while the robot goes on."""
-    if not _is_told(case):
+    if not (_is_told(case) or silent_topic(case)):
         return None
     for source in case.sources.values():
         if has_threads(source):
