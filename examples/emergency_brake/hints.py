@@ -75,7 +75,7 @@ def silent_while_braking(case: Case) -> Clue | None:
     calls = publish_calls(case.source)
     tests = [next(iter(conditions(case.source, call)), None) for call in calls]
     test = tests[0] if len(tests) == 1 else None
-    if case.criterion.id not in ("blind", "hits_nothing") or test is None:
+    if case.check.topic != "/truth/collisions" or test is None:
         return None
     hint = f"under 'if {case.source.code(test.test, 50)}' nothing is published otherwise, and a robot goes on as it "
     return Clue(f"{hint}was told last: publish a Twist of zeros too", case.source.place(test))

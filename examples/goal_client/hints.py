@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 
 from grader.api import Case, Clue, hint_rule
-from grader.api.unstable import first_line
+from grader.api.unstable import first_line, names_in
 
 
 def named(node: ast.AST, *names: str) -> bool:
@@ -77,8 +77,12 @@ def cancel_forgotten(case: Case) -> Clue | None:
 @hint_rule("sends_goals")
 def rejected_place_is_skipped(case: Case) -> Clue | None:
     """A rejected goal moves on to the next place, as a result does."""
+    indices = {
+        name for node in case.source.all(ast.Subscript) if named(node.value, "PLACES") for name in names_in(node)
+    }
     for branch in branches(case, "accepted"):
-        counted = [node for part in branch.body for node in ast.walk(part) if isinstance(node, ast.AugAssign)]
+        found = [node for part in branch.body for node in ast.walk(part) if isinstance(node, ast.AugAssign)]
+        counted = [node for node in found if case.source.code(node.target) in indices]
         if case.check.goals and counted and isinstance(branch.test, ast.UnaryOp):
             hint = f"{case.source.code(counted[0])} skips a place that was rejected: send the same one again"
             return Clue(hint, case.source.place(counted[0]))

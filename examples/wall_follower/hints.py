@@ -34,9 +34,11 @@ def faster_than_allowed(case: Case) -> Clue | None:
     for given in given_leaf(case.source, "x"):
         if case.check.field != "linear.x" or "linear" not in case.source.code(given):
             continue
-        for factor in factors(given.value):
+        parts = factors(given.value)
+        for factor in parts:
             found = constant_value(case.source, factor)
-            if found is not None and abs(found.value) > case.check.high:
+            is_speed = len(parts) == 1 or any(word in last_name(factor).lower() for word in ("speed", "vel"))
+            if found is not None and is_speed and abs(found.value) > case.check.high:
                 hint = f"{case.source.code(factor, 30)} is {found.value:g} m/s, and at most {case.check.high:g} m/s is"
                 return Clue(f"{hint} allowed: make it less", case.source.place(found.origin))
     return None

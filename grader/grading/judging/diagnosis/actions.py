@@ -329,6 +329,8 @@ def _status_beside_result(crash: Crash) -> Clue | None:
 def _sleeps_before_a_goal(case: Case) -> Clue | None:
     """A callback sleeps for longer than there is time to react."""
     source = case.source
+    if has_threads(source):
+        return None
     inside = {node for function in source.called_back() for node in subtree(function)}
     for call in source.calling("time.sleep"):
         worth = number_in_code(source, argument(call, 0, "secs"))
