@@ -206,6 +206,9 @@ def test_of_several_clients_the_one_with_a_similar_name_is_told() -> None:
         assert clue("other_action", "sends_goals", recording, text)[: len(told) or None] == told
 
 
+SLEEPS = RIGHT.replace(
+    "            return\n", "            time.sleep(5.0)\n            self.send()\n            return\n"
+)
 #: A rule, its check with parameters, a recording, and a program that fails for another reason.
 SIBLINGS: dict[str, tuple[str, str, dict[str, Any], Client, str]] = {
     "a goal waits for a condition": (
@@ -234,6 +237,13 @@ SIBLINGS: dict[str, tuple[str, str, dict[str, Any], Client, str]] = {
         client().goal(1, 1, 5),
         RIGHT.replace("goal.order = 5", "goal.order, self.last = self.wanted()\n        tune.score.order = 2"),
     ),
+    "other callbacks run beside a sleep": (
+        "sleeps_before_a_goal",
+        "after_goal",
+        {"end": "rejected"},
+        client().goal(1, 1, 5, accepted=False),
+        f"import time\n{SLEEPS}\nexecutor = MultiThreadedExecutor()\n",
+    ),
 }
 
 
@@ -242,6 +252,13 @@ def test_what_only_resembles_a_mistake_is_not_blamed(name: str) -> None:
     """The program is wrong elsewhere, and the hint would lead away from it."""
     rule, check, parameters, recording, text = SIBLINGS[name]
     assert clue(rule, check, recording, text, **parameters) == ""
+
+
+def test_a_sleep_that_holds_up_the_next_goal_is_told() -> None:
+    """Where nothing runs beside it."""
+    recording = client().goal(1, 1, 5, accepted=False)
+    told = clue("sleeps_before_a_goal", "after_goal", recording, f"import time\n{SLEEPS}", end="rejected")
+    assert "time.sleep(5.0) holds up every callback for 5 s" in told
 
 
 #: What a callback does that cancels right, or at another number, which the second word tells.
