@@ -111,6 +111,7 @@ rclpy.spin(rclpy.create_node("killed"))
 """
 
 TESTS = """\
+import pytest
 from std_msgs.msg import String
 
 
@@ -120,6 +121,7 @@ def test_counts(ros):
     assert counts.output.startswith("ended")
 
 
+@pytest.mark.filterwarnings("ignore:colorsys.py has the name of a module")
 def test_spins(ros):
     ros.run("hiding/spins.py")
     ros.publish("/in", String(data="a"), rate=5.0)

@@ -152,8 +152,8 @@ def test_pairs_without_a_page_are_in_the_table() -> None:
     assert f"pair-{last:03}" in overview
     assert f"pair-{last + 1:03}" not in overview + render_pair(found, last - 1)
     rows = list(csv.DictReader(io.StringIO(render_table(found))))
-    assert [row["page"] for row in rows[last - 1 :]] == [f"similarity/pair-{last:03}.html", "", ""]
-    assert [row["kind"] for row in rows[last - 1 :]] == ["similar", "similar", "identical"]
+    assert [row["page"] for row in rows[last - 1 :]] == [f"similarity/pair-{last:03}.html", "", "", ""]
+    assert [row["kind"] for row in rows[last - 1 :]] == ["similar", "similar", "identical", "same messages"]
 
 
 def test_no_cell_of_the_table_is_a_formula() -> None:

@@ -148,7 +148,7 @@ def test_every_part_of_a_recording_is_compared_or_left_out_on_purpose() -> None:
     """A new field of a trace has to be put here, and into the comparison if it should repeat."""
     compared = {"observations", "clock_reason", "stop_ns", "starts", "written", "left_out", "newer", "notes", "reached"}
     compared |= {"unstarted", "tested", "drawn"}
-    same_by_plan = {"scenario", "clock"}
+    same_by_plan = {"scenario", "clock", "bag"}
     failures = {"harness_problem", "suspected", "author_mistake", "unchecked"}  # then nothing is compared
     measured = {"may_drift", "most_starved_ns", "all_starved_ns", "incomplete", "other_numpy"}
     names = {field.name for field in fields(AssessedTrace) if field.init}
