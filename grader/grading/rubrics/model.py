@@ -194,11 +194,6 @@ _MOST_DRAWS = 20
 Draws = Annotated[Whole, must(lambda count: 1 <= count <= _MOST_DRAWS, f"a whole number from 1 to {_MOST_DRAWS}")]
 
 
-def _never_empty(schema: dict[str, Any]) -> None:
-    """Leave the default out of the schema of a list that may be left out, but not be empty."""
-    del schema["default"]
-
-
 class ScenarioShape(Shape):
     """One situation that is recorded once."""
 
@@ -207,7 +202,7 @@ class ScenarioShape(Shape):
     )
 
     id: Id
-    processes: tuple[ProgramName, ...] = Field(default=(), min_length=1, json_schema_extra=_never_empty)
+    processes: tuple[ProgramName, ...] = Field(default_factory=tuple, min_length=1)
     observe: ObserveShape | None = None
     handed_in: HandedInBagShape | None = Field(
         default=None, description="a recording that students hand in, in place of everything else"
@@ -253,7 +248,7 @@ class RubricShape(Shape):
 
     format: Literal["grader/rubric/v1"] = Field(alias="schema")
     exercise: ExerciseShape
-    files: tuple[HandedIn, ...] = Field(default=(), min_length=1, json_schema_extra=_never_empty)
+    files: tuple[HandedIn, ...] = Field(default_factory=tuple, min_length=1)
     provided: tuple[ProvidedFile, ...] = Field(
         default=(), description="launch files and parameter files of the rubric's own, beside it"
     )
