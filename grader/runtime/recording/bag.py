@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -301,10 +302,15 @@ def _types(path: Path, type_: str, define: Define | None) -> Typestore:
 
 def message_fields(message: Any) -> Mapping[str, Any]:
     """Return the fields of a message as plain values, named as in its definition, without what nobody judges."""
-    # what has a default is a constant of the type
-    names = [one.name for one in fields(message) if one.default is MISSING and one.name != _NOT_KEPT]
-    plain = {name: _plain(getattr(message, name)) for name in names}
+    kind: type = type(message)
+    plain = {name: _plain(getattr(message, name)) for name in _kept_fields(kind)}
     return {name: value for name, value in plain.items() if not isinstance(value, list) or len(value) <= MOST_ELEMENTS}
+
+
+@lru_cache(maxsize=512)
+def _kept_fields(kind: type) -> tuple[str, ...]:
+    """Return the names of the fields that are kept of messages of a type: what has a default is a constant of it."""
+    return tuple(one.name for one in fields(kind) if one.default is MISSING and one.name != _NOT_KEPT)
 
 
 def _plain(value: Any) -> Any:
