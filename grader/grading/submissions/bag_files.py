@@ -11,10 +11,8 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.scenario import BAG_COMPRESSED, is_bag_file
 from grader.runtime.model.submission import StudentFile
 from grader.runtime.model.wording import first_of, listed, printable
-from grader.runtime.recording.bag import HINT_ROS_1
+from grader.runtime.recording.bag import HINT_ROS_1, METADATA
 
-#: What makes a folder with recorded files one recording.
-METADATA = "metadata.yaml"
 #: What to hand in, for a student who has handed in none.
 _ONE = "hand in one recording{}, as `ros2 bag record{}` makes it: its folder, or its {} file"
 #: How a pattern ends that one kind of storage alone fits, and the name that `ros2 bag record` has for this kind.

@@ -34,7 +34,16 @@ from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 
-from grader.grading.submissions.bag_words import LARGE, ODD_NAME, SMALLER, TOO_LONG, TOO_MANY, TOO_MUCH, UNDEFINED
+from grader.grading.submissions.bag_words import (
+    LARGE,
+    LONGEST_NAME,
+    ODD_NAME,
+    SMALLER,
+    TOO_LONG,
+    TOO_MANY,
+    TOO_MUCH,
+    UNDEFINED,
+)
 from grader.runtime.contained import confine
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RecordingError
@@ -45,6 +54,7 @@ from grader.runtime.model.trace import AssessedTrace, BagContents, ClockKind, De
 from grader.runtime.recording.bag import (
     HEAD_BYTES,
     HINT_DAMAGED,
+    METADATA,
     message_fields,
     one_line,
     opened_bag,
@@ -54,14 +64,12 @@ from grader.runtime.recording.bag import (
 )
 from grader.runtime.recording.codec import observation_to_json, trace_to_json
 
-_METADATA = "metadata.yaml"
 #: YAML of this size takes ten seconds; rosbag2 writes some kilobytes.
 _MOST_METADATA = 256 << 10
 #: The most topics that are told: a robot has some hundreds at most.
 _MOST_TOPICS = 500
 _TOPIC = re.compile(r"(?:/[A-Za-z_][A-Za-z0-9_]*)+")
 _TYPE = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*")
-_LONGEST_NAME = 255
 #: A time of a message in JSON; inside of a text, quotes would have a backslash.
 _STAMP = re.compile(r'"stamp": \{"sec": -?[0-9]+, "nanosec": [0-9]+\}')
 #: Times of recordings are nanoseconds in 63 bits.
@@ -226,12 +234,12 @@ def _source(asked: Mapping[str, Any]) -> _Place:
             refuse_ros_1(path, head)
             refuse_empty(path, head)
             refuse_cut(path, head, file.size)
-    if _METADATA in files:
+    if METADATA in files:
         return _Place(_unpacked(asked, files))
     (name,) = files
     if name.casefold().endswith(BAG_COMPRESSED):
         text = f"{one_line(name)}: expected the folder of a compressed recording, found the file alone"
-        raise RecordingError(text, f"hand in its folder, with {_METADATA}")
+        raise RecordingError(text, f"hand in its folder, with {METADATA}")
     plain = name.casefold()  # rosbags knows the endings in lower case
     return _Place({plain: files[name]}, plain)
 
@@ -244,11 +252,11 @@ def _unpacked(asked: Mapping[str, Any], files: dict[str, _GivenFile]) -> dict[st
     from ruamel.yaml import YAML  # noqa: PLC0415 - loaded already
     from ruamel.yaml.error import YAMLError  # noqa: PLC0415
 
-    where = f"{one_line(asked['bag'])}/{_METADATA}"
-    if files[_METADATA].size > _MOST_METADATA:
+    where = f"{one_line(asked['bag'])}/{METADATA}"
+    if files[METADATA].size > _MOST_METADATA:
         raise RecordingError(f"{where}: expected at most {size(_MOST_METADATA)}, found more", HINT_DAMAGED)
     try:
-        data = YAML(typ="safe").load(files[_METADATA].open().read().decode())
+        data = YAML(typ="safe").load(files[METADATA].open().read().decode())
         about = data["rosbag2_bagfile_information"]
         names = [PurePosixPath(name).name for name in about["relative_file_paths"]]
         compressed = str(about.get("compression_mode") or "").casefold() == "file"
@@ -269,7 +277,7 @@ def _unpacked(asked: Mapping[str, Any], files: dict[str, _GivenFile]) -> dict[st
         plain[PurePosixPath(name).stem] = _GivenFile(len(content), content=content)
     told = {**about, "relative_file_paths": list(plain), "compression_mode": "", "compression_format": ""}
     metadata = json.dumps({"rosbag2_bagfile_information": told}, default=str).encode()
-    return {**plain, _METADATA: _GivenFile(len(metadata), content=metadata)}
+    return {**plain, METADATA: _GivenFile(len(metadata), content=metadata)}
 
 
 def _without_compression(packed: BinaryIO, most: int, name: str) -> bytes:
@@ -454,7 +462,7 @@ def _is_named(connection: Any) -> bool:
     return (
         isinstance(topic, str)
         and isinstance(type_, str)
-        and max(len(topic), len(type_)) <= _LONGEST_NAME
+        and max(len(topic), len(type_)) <= LONGEST_NAME
         and _TOPIC.fullmatch(topic) is not None
         and _TYPE.fullmatch(type_) is not None
     )

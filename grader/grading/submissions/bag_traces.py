@@ -17,6 +17,7 @@ from typing import TypeAlias
 from grader.grading.submissions.bag_files import bags_in
 from grader.grading.submissions.bag_words import (
     LARGE,
+    LONGEST_NAME,
     ODD_NAME,
     SMALLER,
     TOO_LONG,
@@ -46,8 +47,6 @@ MEMORY_BYTES = 1024 * MIB
 #: message in others. Each takes the grader about 250 bytes, and a recording of some kilobytes may unpack to millions.
 MOST_NESTED = 1_000_000
 _BYTES_OF_ONE = 8
-#: The longest name of a topic or a type.
-_LONGEST_NAME = 255
 #: The most characters of what the process says of a recording that it cannot read.
 _MOST_CHARACTERS = 1_000
 
@@ -188,7 +187,7 @@ def _is_sound(trace: AssessedTrace) -> bool:
             if not isinstance(one.value, Mapping):
                 return False
     in_order = all(before <= after for before, after in pairwise([*times, trace.stop_ns - 1]))
-    return in_order and all(name.isprintable() and 0 < len(name) <= _LONGEST_NAME for name in names)
+    return in_order and all(name.isprintable() and 0 < len(name) <= LONGEST_NAME for name in names)
 
 
 def _notes(cut: Iterable[tuple[str, str]], scenario: Scenario, where: str) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The words in which the contained process says what it has not read of a recording."""
+"""The words and the limit that the grader shares with the contained process that reads a recording."""
 
 from __future__ import annotations
 
@@ -14,5 +14,7 @@ UNDEFINED: Final = "undefined"
 LARGE: Final = "large"
 #: ROS does not allow the name of a topic or type.
 ODD_NAME: Final = "odd name"
+#: The longest name of a topic or a type.
+LONGEST_NAME: Final = 255
 #: What to do about a recording that is too much to read.
 SMALLER = "record only the topics that are asked for, and stop the recorder when the robot is done"

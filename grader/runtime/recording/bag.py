@@ -17,6 +17,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import RecordingError
 from grader.runtime.model.quantities import seconds
 from grader.runtime.model.releases import DEFAULT
+from grader.runtime.model.scenario import BAG_COMPRESSED, BAG_ENDINGS
 from grader.runtime.stimuli.recorded import Recording, TimedMessage
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ MOST_ELEMENTS = 10_000
 #: check asks for them, and all would pass through each plan and each trace.
 _NOT_KEPT = "covariance"
 
-_STORAGE = (".mcap", ".db3")
+#: What makes a folder with recorded files one recording.
+METADATA = "metadata.yaml"
 _CDR_LITTLE_ENDIAN = b"\x00\x01"
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _ROS_1_MAGIC = b"#ROSBAG V"
@@ -112,13 +114,13 @@ def _source(path: Path) -> Path:
 
 def _source_in(folder: Path) -> Path:
     entries = sorted(folder.iterdir())
-    storages = [e for e in entries if e.suffix in _STORAGE or e.suffixes[-1:] == [".zstd"]]
+    storages = [e for e in entries if e.suffix in (*BAG_ENDINGS, BAG_COMPRESSED)]
     for storage in storages:
         _probe(storage)
-    if (folder / "metadata.yaml").exists():
-        _probe(folder / "metadata.yaml")
+    if (folder / METADATA).exists():
+        _probe(folder / METADATA)
         return folder
-    bare = [s for s in storages if s.suffix in _STORAGE]
+    bare = [s for s in storages if s.suffix in BAG_ENDINGS]
     if len(bare) == 1:
         return _source_file(bare[0])
     if bare:
@@ -138,9 +140,9 @@ def _source_file(path: Path) -> Path:
         raise RecordingError(f"{one_line(path)}: expected a recording, found neither a file nor a folder", HINT_SOURCE)
     head = _probe(path)
     refuse_ros_1(path, head)
-    if path.name == "metadata.yaml":
+    if path.name == METADATA:
         return _source_in(path.parent)
-    if path.suffix not in _STORAGE:
+    if path.suffix not in BAG_ENDINGS:
         found = f"the ending {one_line(path.suffix)}" if path.suffix else "no ending"
         raise RecordingError(f"{one_line(path)}: expected a .mcap or .db3 file, found {found}", HINT_SOURCE)
     refuse_empty(path, head)
