@@ -88,18 +88,25 @@ NOT_IN_BAGS: Mapping[str, str] = {
             "logs_values",
             "logs_texts",
             "logs_response",
+            "logs_matching",
         ),
         "what programs log",
     ),
-    "logs_matching": "what programs log",
     **dict.fromkeys(
         ("subscribes", "bidirectional_graph", "qos", "node_name", "topic_names", "graph_edges"), "the graph of nodes"
     ),
     **dict.fromkeys(
-        ("service_available", "service_answers_all", "service_response", "service_function", "service_calls"),
+        (
+            "service_available",
+            "service_answers_all",
+            "service_response",
+            "service_function",
+            "service_calls",
+            "waits_for_service",
+            "lifecycle_states",
+        ),
         "calls of services",
     ),
-    **dict.fromkeys(("waits_for_service", "lifecycle_states"), "calls of services"),
     **dict.fromkeys(("action_result", "action_feedback", "sends_goals", "cancels_goal", "after_goal"), "goals"),
     **dict.fromkeys(("no_fault", "clean_shutdown"), "how programs end"),
     **dict.fromkeys(("parameter_declared", "parameter_takes_effect"), "parameters of nodes"),
