@@ -41,8 +41,8 @@ class FoundBag:
     @property
     def names(self) -> Iterator[str]:
         """The names that a pattern may stand for: those of its folder and of its files."""
-        yield from (PurePosixPath(file).name for file in self.files if is_bag_file(file))
-        yield from (PurePosixPath(file).name.removesuffix(BAG_COMPRESSED) for file in self.files if is_bag_file(file))
+        for name in (PurePosixPath(file).name for file in self.files if is_bag_file(file)):
+            yield from (name, name.removesuffix(BAG_COMPRESSED))
         yield PurePosixPath(self.path).name
 
 

@@ -20,7 +20,7 @@ from grader.runtime.model.limits import (
     MAX_PATH_BYTES,
     MAX_TOTAL_BYTES,
 )
-from grader.runtime.model.scenario import is_bag_file, is_bag_pattern
+from grader.runtime.model.scenario import is_bag_file, wants_bag
 from grader.runtime.model.wording import first_of, printable
 
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
@@ -86,7 +86,7 @@ _WITH_BAGS = replace(USUAL, bag_bytes=MAX_BAG_BYTES)
 
 def limits_for(wanted: Iterable[str]) -> SubmissionLimits:
     """Return the limits of a submission that is to have these files."""
-    return _WITH_BAGS if any(map(is_bag_pattern, wanted)) else USUAL
+    return _WITH_BAGS if wants_bag(wanted) else USUAL
 
 
 def is_skipped_folder(name: str) -> bool:

@@ -19,7 +19,7 @@ from grader.grading.submissions.staging import collect_folder, read_start, write
 from grader.runtime.model.errors import SubmissionError
 from grader.runtime.model.limits import MAX_FILE_BYTES
 from grader.runtime.model.projects import ExaminedPackage, Project
-from grader.runtime.model.scenario import is_bag_file, is_bag_pattern
+from grader.runtime.model.scenario import is_bag_file, is_bag_pattern, wants_bag
 from grader.runtime.model.submission import EXPORT_NOTEBOOK, StudentFile, Submission, is_notebook
 from grader.runtime.model.wording import first_of, listed, printable
 from grader.runtime.programs.executables import Executable, executables, find_executables
@@ -115,14 +115,15 @@ def stage_collected(
     # without wanted files, it is staged for its digest alone
     contents = read_contents(into, likely | set(meant.values())) if wanted else SubmissionContents((), {}, ())
     projects, programs = contents.projects, executables(into, contents.projects)
-    files = {
-        name: _look_for_executable(name, into, projects, programs, collected.files, wanted)
-        if "/" in name and name not in meant
-        else find_bag(name, [file for file, _ in collected.files], collected.too_large)
-        if is_bag_pattern(name)
-        else _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
-        for name in wanted
-    }
+
+    def found(name: str) -> StudentFile:
+        if "/" in name and name not in meant:
+            return _look_for_executable(name, into, projects, programs, collected.files, wanted)
+        if is_bag_pattern(name):
+            return find_bag(name, [file for file, _ in collected.files], collected.too_large)
+        return _look_for(name, collected.files, wanted, programs, meant.get(name, ""))
+
+    files = {name: found(name) for name in wanted}
     several = tuple(note for file in files.values() for note in _notes_on(file))
     packages: tuple[ExaminedPackage, ...] = ()
     if projects:
@@ -224,15 +225,14 @@ def _with_work(collected: Collected, wanted: Sequence[str], where: str) -> Colle
 
     Where a recording is wanted, a submission without any is graded: its criteria say what is missing.
     """
-    names, bags = [name for name, _ in collected.files], any(map(is_bag_pattern, wanted))
-    if _has_work(names, wanted):
+    if _has_work([name for name, _ in collected.files], wanted):
         return collected
     from grader.grading.submissions.archives import collect_archive  # noqa: PLC0415 - as above
 
-    archives = _archives(collected)
-    if bags and len(archives) != 1:
-        return collected
+    archives, bags = _archives(collected), wants_bag(wanted)
     if len(archives) != 1:
+        if bags:
+            return collected
         raise _no_python(collected, wanted, where)
     name, packed = archives[0]
     inside = f"{where.rstrip('/')}/{printable(name)}"
@@ -245,7 +245,7 @@ def _with_work(collected: Collected, wanted: Sequence[str], where: str) -> Colle
 
 def _has_work(names: Sequence[str], wanted: Sequence[str]) -> bool:
     """Whether there is a .py file or a wanted file, such as a launch file in XML or a recording."""
-    bags, others = any(map(is_bag_pattern, wanted)), _file_names(wanted)
+    bags, others = wants_bag(wanted), _file_names(wanted)
     return _has_python(names) or any((bags and is_bag_file(n)) or n.rpartition("/")[2] in others for n in names)
 
 

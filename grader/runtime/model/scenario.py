@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
@@ -338,3 +338,8 @@ def is_bag_file(name: str) -> bool:
 def is_bag_pattern(wanted: str) -> bool:
     """Return whether the name of a wanted file is the pattern of a recording: no program has such a name."""
     return "/" not in wanted and not wanted.endswith((".py", ".yaml", ".yml", ".xml"))
+
+
+def wants_bag(wanted: Iterable[str]) -> bool:
+    """Return whether a recording is among the wanted files."""
+    return any(map(is_bag_pattern, wanted))
