@@ -265,10 +265,8 @@ class _Checked:
         self._interfaces = interfaces
         self._stimuli = tuple(_stimuli(rubric))
         self._simulated = tuple(_simulated(rubric))
-        #: A recording may bring the definitions of its types, so an unknown type in a check of one is right.
-        self._checks = tuple(
-            (path, check) for path, check, of_bag in _checks(rubric) if not (of_bag and _is_unknown(check, interfaces))
-        )
+        checks = tuple(_checks(rubric))
+        self._checks = tuple((path, check) for path, check, _ in checks)
         #: Type of each topic, service and action; a topic with numbers has the type that the student's node chooses.
         self._types: dict[str, set[str]] = {}
         self._free: set[str] = set()
@@ -278,8 +276,13 @@ class _Checked:
                 if "/action/" in named.type:  # its feedback is a topic, which checks may read like any other
                     feedback = f"{named.type}_FeedbackMessage"
                     self._types.setdefault(f"{on}/_action/feedback", set()).add(feedback)
-        untyped = {path for path, check, of_bag in _checks(rubric) if of_bag and _end_of(check) not in self._types}
-        self._checks = tuple((path, check) for path, check in self._checks if path not in untyped)
+        #: A recording may bring the definitions of its types, so an unknown type in a check of one is right, and no
+        #: field is looked up on a topic without a known type.
+        self._checks = tuple(
+            (path, check)
+            for path, check, of_bag in checks
+            if not (of_bag and (_is_unknown(check, interfaces) or _end_of(check) not in self._types))
+        )
 
     def _of_stimuli(self) -> Iterator[tuple[_Named, str]]:
         for path, stimulus in self._stimuli:
