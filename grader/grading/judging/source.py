@@ -187,17 +187,18 @@ class Source:
     def _has_base(self, class_: ast.ClassDef, wanted: tuple[str, ...], known: set[str]) -> bool:
         return any(chain(base) in known or any(self.means(base, w) for w in wanted) for base in class_.bases)
 
-    def called_back(self) -> list[ast.AST]:
-        """Return the functions that run as callbacks, and those of the file that they call, without duplicates."""
+    def called_back(self) -> set[ast.AST]:
+        """Return every node of the functions that run as callbacks, and of those of the file that they call."""
         functions = {f.name: f for f in self.functions()}
         waiting: list[ast.AST] = [f for call in self.calls(*_TAKE_CALLBACKS) for f in _handed_over(call, functions)]
-        found: list[ast.AST] = []
+        found: set[ast.AST] = set()
         while waiting:
             here = waiting.pop()
-            if here in found:
+            if here in found:  # with all that is in it
                 continue
-            found.append(here)
-            called = (n.func for n in subtree(here) if isinstance(n, ast.Call))
+            inside = set(subtree(here))
+            found |= inside
+            called = (n.func for n in inside if isinstance(n, ast.Call))
             waiting += [functions[name] for func in called if (name := _own_name(func)) in functions]
         return found
 

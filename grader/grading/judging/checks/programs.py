@@ -29,7 +29,7 @@ from grader.grading.judging.service_calls import (
     reported_parameter,
     settings,
 )
-from grader.grading.judging.source import Source, read_source, subtree
+from grader.grading.judging.source import Source, read_source
 from grader.grading.judging.values import FieldRule, as_number, published, shown_value, value_at
 from grader.grading.model.chart import Look, Panel
 from grader.grading.model.exercise import Finding, Location, ProblemKind, Roles
@@ -448,13 +448,12 @@ class SourceAvoids(_OfSource):
         return replace(not_met(reason, evidence, hint=hint), location=Location(self.process, line))
 
     def _found(self, source: Source) -> list[tuple[int, str]]:
-        # By identity: two calls that read alike are different nodes, and only one may be in a callback.
-        inside = {id(n) for f in source.called_back() for n in subtree(f)} if self.where == "callbacks" else None
+        inside = source.called_back() if self.where == "callbacks" else None
         calls = [(c, name) for name in self.calls for c in source.calling(name)]
         places: Sequence[tuple[ast.stmt | ast.expr, str]] = calls
         if self.globals:
             places = [*calls, *((g, f"global {', '.join(g.names)[:60]}") for g in source.all(ast.Global))]
-        return sorted({(n.lineno, name) for n, name in places if inside is None or id(n) in inside})
+        return sorted({(n.lineno, name) for n, name in places if inside is None or n in inside})
 
 
 def _source(trace: Trace, sources: Mapping[str, str], process: str) -> Source | Finding:

@@ -95,7 +95,7 @@ def _waits_for_a_goal(case: Case) -> Clue | None:
     source = case.source
     if has_threads(source) or not any(source.calls("ActionClient")):
         return None
-    inside = {node for function in source.called_back() for node in subtree(function)}
+    inside = source.called_back()
     clients = {target_of(source, call) for call in source.calls("ActionClient")} - {""}
     for call in source.calls("send_goal"):
         if isinstance(call.func, ast.Attribute) and chain(call.func.value) in clients:
@@ -125,7 +125,7 @@ def _timer_never_ends(case: Case) -> Clue | None:
     source = case.source
     if any(source.calls(*_ENDS, "reset")):
         return None
-    inside = {node for function in source.called_back() for node in subtree(function)}
+    inside = source.called_back()
     for item in made(source, "timer"):
         callback = runs(source, item)
         sends = [n for n in callback if isinstance(n, ast.Call) and last_name(n.func) in _SENDS]
@@ -141,7 +141,7 @@ def _timer_never_ends(case: Case) -> Clue | None:
 def _goal_timer_too_slow(case: Case) -> Clue | None:
     """The timer that sends the next goal has a longer period than the time for it."""
     source, within_s = case.source, seconds(case.check.within)
-    inside = {node for function in source.called_back() for node in subtree(function)}
+    inside = source.called_back()
     for item in made(source, "timer"):
         worth = constant_value(source, item.period)
         called = {last_name(n.func) for n in runs(source, item) if isinstance(n, ast.Call)}
@@ -331,7 +331,7 @@ def _sleeps_before_a_goal(case: Case) -> Clue | None:
     source = case.source
     if has_threads(source):
         return None
-    inside = {node for function in source.called_back() for node in subtree(function)}
+    inside = source.called_back()
     for call in source.calling("time.sleep"):
         worth = number_in_code(source, argument(call, 0, "secs"))
         if call in inside and worth is not None and worth > seconds(case.check.within):
