@@ -18,10 +18,12 @@ from grader.grading.judging.diagnosis.wiring import (
     number_in_code,
     runs,
     spin_for,
+    spun_again,
     target_of,
     text_in_code,
     text_origin,
     timer_code,
+    unspun_wait,
     used,
     value_of,
 )
@@ -102,16 +104,13 @@ def _waits_for_a_goal(case: Case) -> Clue | None:
             hint = f"{source.code(call, 50)} waits for the result, and the node does not spin meanwhile"
             hint += ": call send_goal_async, and add_done_callback"
             return Clue(hint, source.place(call), key="waits_for_goal")
-    for loop in source.all(ast.While):
-        asked = [n.func for n in ast.walk(loop.test) if isinstance(n, ast.Call) and last_name(n.func) == "done"]
-        if asked and not names_called(source, [loop]) & {"spin_once", "spin_until_future_complete"}:
-            future = chain(asked[0]).removesuffix(".done") or "future"
-            hint = f"'while {source.code(loop.test, 40)}' never ends, because the node does not spin meanwhile: "
-            use = f"give {future}.add_done_callback what comes next"
-            use = use if loop in inside else f"use {spin_for(source, loop, future)}"
-            return Clue(f"{hint}{use}", source.place(loop), key="waits_for_goal")
-    spun = next((c for c in source.calls("spin_until_future_complete", "spin_once") if c in inside), None)
-    if spun is None or not any(last_name(n) == "spin" for n in source.names()):
+    if (found := unspun_wait(source)) is not None:
+        loop, future = found
+        hint = f"'while {source.code(loop.test, 40)}' never ends, because the node does not spin meanwhile: "
+        use = f"give {future}.add_done_callback what comes next"
+        use = use if loop in inside else f"use {spin_for(source, loop, future)}"
+        return Clue(f"{hint}{use}", source.place(loop), key="waits_for_goal")
+    if (spun := spun_again(source, inside)) is None:
         return None
     waited = argument(spun, 1, "future")
     code = source.code(waited, 40) if waited is not None else "future"

@@ -11,14 +11,15 @@ from grader.grading.judging.diagnosis.wiring import (
     elsewhere_because,
     goes_to,
     has_threads,
-    names_called,
     reached,
     roots,
     short,
     spin_for,
+    spun_again,
     target_of,
     text_in_code,
     text_origin,
+    unspun_wait,
 )
 from grader.grading.judging.facts import OtherEnd
 from grader.grading.judging.source import (
@@ -166,9 +167,8 @@ def _synchronous_call(case: Case) -> Clue | None:
 def _spins_in_callback(case: Case) -> Clue | None:
     """A callback spins the node that is spinning already."""
     source = case.source
-    inside = callback_nodes(source)
-    call = next((c for c in source.calls("spin_until_future_complete", "spin_once") if c in inside), None)
-    if call is None or not any(last_name(n) == "spin" for n in source.names()):
+    call = spun_again(source, callback_nodes(source))
+    if call is None:
         return None
     hint = (
         f"{source.code(call)} runs in a callback, while the node is already spinning: take the response in a function"
@@ -180,16 +180,13 @@ def _spins_in_callback(case: Case) -> Clue | None:
 def _future_never_done(case: Case) -> Clue | None:
     """A loop asks whether a future is done, and nothing spins the node meanwhile."""
     source = case.source
-    if has_threads(source):
+    found = None if has_threads(source) else unspun_wait(source)
+    if found is None:
         return None
-    for loop in source.all(ast.While):
-        asked = [n.func for n in ast.walk(loop.test) if isinstance(n, ast.Call) and last_name(n.func) == "done"]
-        if asked and not names_called(source, [loop]) & set(SPINS):
-            future = chain(asked[0]).removesuffix(".done") or "future"
-            hint = f"'while {source.code(loop.test, 40)}' never ends: a response is taken only while the node spins; "
-            advice = _waiting_in(source, loop, future) or f"use {spin_for(source, loop, future)}"
-            return Clue(f"{hint}{advice}", source.place(loop))
-    return None
+    loop, future = found
+    hint = f"'while {source.code(loop.test, 40)}' never ends: a response is taken only while the node spins; "
+    advice = _waiting_in(source, loop, future) or f"use {spin_for(source, loop, future)}"
+    return Clue(f"{hint}{advice}", source.place(loop))
 
 
 @hint_rule(given=_calling, priority=3060)

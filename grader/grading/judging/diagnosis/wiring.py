@@ -6,7 +6,7 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import TypeGuard
 
@@ -555,6 +555,22 @@ def has_threads(source: Source) -> bool:
 def spins(source: Source) -> list[ast.AST]:
     """Return the places that name a spinning function, called or passed to a thread."""
     return [n for n in source.names() if last_name(n) in SPINS]
+
+
+def spun_again(source: Source, inside: Collection[ast.AST]) -> ast.Call | None:
+    """Return a call among the nodes of callbacks that spins the node, which spins already; None if there is none."""
+    if not any(last_name(n) == "spin" for n in source.names()):
+        return None
+    return next((c for c in source.calls("spin_until_future_complete", "spin_once") if c in inside), None)
+
+
+def unspun_wait(source: Source) -> tuple[ast.While, str] | None:
+    """Return a loop until a future is done in which nothing spins the node, and what the future is called there."""
+    for loop in source.all(ast.While):
+        asked = [n.func for n in ast.walk(loop.test) if isinstance(n, ast.Call) and last_name(n.func) == "done"]
+        if asked and not names_called(source, [loop]) & set(SPINS):
+            return loop, chain(asked[0]).removesuffix(".done") or "future"
+    return None
 
 
 def node_made(source: Source) -> ast.Call | None:
