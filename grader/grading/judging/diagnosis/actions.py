@@ -12,6 +12,7 @@ from grader.grading.judging.diagnosis.wiring import (
     constant_value,
     given_leaf,
     goes_to,
+    has_no_caller,
     has_threads,
     made,
     names_called,
@@ -24,7 +25,6 @@ from grader.grading.judging.diagnosis.wiring import (
     text_origin,
     timer_code,
     unspun_wait,
-    used,
     value_of,
 )
 from grader.grading.judging.facts import GoalFieldFacts
@@ -80,7 +80,7 @@ def _no_goal_sent(case: Case) -> Clue | None:
         hint = f"{source.code(client)} makes a client, and nothing in the file calls its send_goal_async"
         return Clue(hint, source.place(client), key="no_goal")
     senders = [source.function_of(call) for call in sends]
-    unused = [f for f in senders if f is not None and f.name not in ("main", "__init__") and not used(source, f)]
+    unused = [f for f in senders if f is not None and has_no_caller(source, f)]
     if len(unused) == len(sends):
         own = "self." if source.is_method(unused[0]) else ""
         hint = f"nothing calls {unused[0].name}, which sends the goal: call {own}{unused[0].name}()"

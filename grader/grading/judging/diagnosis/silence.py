@@ -22,6 +22,7 @@ from grader.grading.judging.diagnosis.wiring import (
     conditions,
     constant_value,
     elsewhere_because,
+    has_no_caller,
     has_threads,
     head_of,
     is_flag,
@@ -44,7 +45,6 @@ from grader.grading.judging.diagnosis.wiring import (
     text_origin,
     time_since,
     timer_code,
-    used,
     value_of,
     variable_of,
     waits_for_ever,
@@ -616,7 +616,7 @@ def _never_called(unseen: _Unseen) -> Clue | None:
     """The code that publishes or logs is in a method that nothing calls."""
     source = unseen.source
     functions = list(dict.fromkeys(source.function_of(c) for c in unseen.calls))[:MOST_MADE]
-    dead = [f for f in functions if f is not None and not used(source, f) and _may_be_unused(source, f)]
+    dead = [f for f in functions if f is not None and has_no_caller(source, f)]
     if len(dead) < len(functions) or not dead:
         return None
     name = dead[0].name
@@ -628,13 +628,6 @@ def _never_called(unseen: _Unseen) -> Clue | None:
     owner = "self." if source.is_method(dead[0]) else ""
     hint = f"nothing calls {name}, which {does}: create a timer that does, create_timer(..., {owner}{name})"
     return Clue(hint, source.place(dead[0]), key=f"dead:{name}")
-
-
-def _may_be_unused(source: Source, function: Function) -> bool:
-    """Return whether a function may be unused, and is not called by name by Python, ROS or a base class."""
-    owner = source.class_of(function)
-    plain = owner is None or all(last_name(b) in ("Node", "object") for b in owner.bases)
-    return plain and not function.name.startswith("__") and function.name != "main" and not function.decorator_list
 
 
 @hint_rule(given=_unseen, priority=8240)

@@ -505,6 +505,14 @@ def used(source: Source, function: Function) -> bool:
     return listed or any(isinstance(n.ctx, ast.Load) for n in names)
 
 
+def has_no_caller(source: Source, function: Function) -> bool:
+    """Return whether nothing calls a function: neither the file nor, by its name, Python, ROS or a base class."""
+    owner = source.class_of(function)
+    plain = owner is None or all(last_name(b) in ("Node", "object") for b in owner.bases)
+    named = function.name.startswith("__") or function.name == "main" or function.decorator_list
+    return plain and not named and not used(source, function)
+
+
 def conditions(source: Source, call: ast.AST) -> list[ast.If]:
     """Return the conditions of a call: those around it, and earlier ones that return."""
     function = source.function_of(call)
