@@ -29,7 +29,16 @@ from grader.grading.judging.diagnosis.wiring import (
 )
 from grader.grading.judging.facts import GoalFieldFacts
 from grader.grading.judging.service_calls import calls_of
-from grader.grading.judging.source import Function, Source, argument, chain, first_line, last_name, subtree
+from grader.grading.judging.source import (
+    Source,
+    argument,
+    chain,
+    first_line,
+    last_name,
+    literal_text,
+    parameters,
+    subtree,
+)
 from grader.grading.judging.values import EXACT
 from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import nearest, number, quote
@@ -210,7 +219,7 @@ def _lacks_goals(case: Case) -> bool:
     return case.is_about(ProblemKind.TOO_FEW) and case.check.end != "rejected"
 
 
-@hint_rule("sends_goals", given=lambda case: case if case.found(GoalFieldFacts) is not None else None, priority=3580)
+@hint_rule("sends_goals", priority=3580)
 def _goal_field(case: Case) -> Clue | None:
     """A field of the goal is not set, or is set to something else."""
     source, facts = case.source, case.found(GoalFieldFacts)
@@ -220,7 +229,7 @@ def _goal_field(case: Case) -> Clue | None:
     shown = f'"{quote(wanted, 40)}"' if isinstance(wanted, str) else number(wanted)
     given = [node for node in given_leaf(source, leaf) if _may_set(node, facts.path)]
     named = [dotted for dotted in source.stored if dotted.endswith(f".{leaf}")]
-    if not given and not named and not any(literal == leaf for literal in _texts(source)):
+    if not given and not named and not any(literal_text(n) == leaf for n in source.all(ast.Constant)):
         goal = next((c for c in source.calls("Goal") if isinstance(c.func, ast.Attribute)), None)
         if goal is None:
             return None
@@ -245,10 +254,6 @@ def _may_set(node: ast.AST, path: str) -> bool:
         return True
     dotted = [chain(target).removeprefix("self.").split(".") for target in node.targets]
     return any(f".{path}".endswith(f".{'.'.join(parts[1:])}") for parts in dotted)
-
-
-def _texts(source: Source) -> set[object]:
-    return {n.value for n in source.all(ast.Constant) if isinstance(n.value, str)}
 
 
 @hint_rule("cancels_goal", priority=3590)
@@ -295,14 +300,9 @@ def _feedback_inside(crash: Crash) -> Clue | None:
     function = crash.source.function_at(crash.line)
     if read is None or function is None:
         return None
-    name = _message_name(function) or crash.source.code(read.value, 40)
+    received = [name for name in parameters(function) if name != "self"]
+    name = received[0] if len(received) == 1 else crash.source.code(read.value, 40)
     return Clue(f"the feedback is a field of what the callback receives: write {name}.feedback.{field}")
-
-
-def _message_name(function: Function) -> str:
-    """Return what a callback calls the message that it receives; empty if the text does not show it."""
-    names = [a.arg for a in (*function.args.posonlyargs, *function.args.args) if a.arg != "self"]
-    return names[0] if len(names) == 1 else ""
 
 
 @crash_rule(
