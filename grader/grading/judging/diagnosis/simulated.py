@@ -26,7 +26,7 @@ from grader.grading.judging.diagnosis.wiring import (
 )
 from grader.grading.judging.simulations import NotHeard, heard_by_simulations, not_heard
 from grader.grading.judging.source import Source, argument, chain, first_line
-from grader.grading.judging.values import student_endpoints, value_at
+from grader.grading.judging.values import number_at, student_endpoints
 from grader.grading.model.exercise import roles_of, texts_under
 from grader.grading.model.wording import nearest, number, quote
 from grader.runtime.model.dataclass import dataclass
@@ -52,23 +52,31 @@ def _may_explain(found: NotHeard, case: Case) -> bool:
     """Return whether a criterion is about the commands, or about what the simulation makes of them."""
     if case.logs:
         return False
-    topics = {*case.topics, *texts_under(case.check, *roles_of(type(case.check)).topics)}
+    topics, heard = _asked_topics(case), _heard(case)
     if topics & {found.topic, found.end.topic}:
         return True
-    heard = {end.topic for end in student_endpoints(case.trace, "subscription")}
-    return any(case.trace.deliveries(topic) and topic in heard for topic in topics)
+    return any(case.trace.deliveries(topic) for topic in topics & heard)
+
+
+def _asked_topics(case: Case) -> set[str]:
+    """Return the topics that a check names, or that its problem is about."""
+    return {*case.topics, *texts_under(case.check, *roles_of(type(case.check)).topics)}
+
+
+def _heard(case: Case) -> set[str]:
+    """Return the topics to which nodes of the student subscribe."""
+    return {end.topic for end in student_endpoints(case.trace, "subscription")}
 
 
 @hint_rule(priority=20)
 def _hears_nobody(case: Case) -> Clue | None:
     """A node subscribes to a topic on which nobody publishes, and not to one of the grader's with the same type."""
-    if case.logs or unheard_topic(case):
+    silent = silent_topic(case)
+    if case.logs or unheard_topic(case) or not (silent or _is_told(case)):
         return None
     for deaf in _deaf(case):
-        inside = set(runs(deaf.source, deaf.item))
         calls = publish_calls(deaf.source)
-        silent = silent_topic(case) and calls and all(call in inside for call in calls)
-        if silent or (not silent_topic(case) and _is_told(case)):
+        if not silent or (calls and {*calls} <= {*runs(deaf.source, deaf.item)}):
             origin = text_origin(deaf.source, argument(deaf.item.call, 1, "topic"), deaf.item.call)
             hint = f"{deaf.source.code(deaf.item.call)} hears nobody"
             hint = f"{hint}: {short(deaf.item.type)} is published on {deaf.topic}, subscribe to that"
@@ -108,12 +116,7 @@ _TRUTH = "/truth/"
 
 def _is_told(case: Case) -> bool:
     """Return whether a check is about a topic of the grader's that no node hears: what a simulation makes of it all."""
-    heard = {end.topic for end in student_endpoints(case.trace, "subscription")}
-    return any(case.trace.deliveries(topic) and topic not in heard for topic in _asked_topics(case))
-
-
-def _asked_topics(case: Case) -> set[str]:
-    return {*case.topics, *texts_under(case.check, *roles_of(type(case.check)).topics)}
+    return any(case.trace.deliveries(topic) for topic in _asked_topics(case) - _heard(case))
 
 
 #: The field by which a robot on wheels drives or turns, and those beside it.
@@ -129,7 +132,7 @@ def _beside_the_wheels(case: Case) -> Clue | None:
     for topic in heard_by_simulations(case.trace):
         messages = [m for m in case.trace.messages(topic) if m.type in _TWISTS]
         for right, others in _BESIDE.items():
-            used = {f for f in (right, *others) if any(_of(m.value, _TWISTS[m.type] + f) for m in messages)}
+            used = {f for f in (right, *others) if any(number_at(m.value, _TWISTS[m.type] + f) for m in messages)}
             if right in used or len(used) != 1:
                 continue
             (wrong,) = used
@@ -140,11 +143,6 @@ def _beside_the_wheels(case: Case) -> Clue | None:
                 hint = f"{source.code(given[0], 50)}: a robot on wheels {does} by {right}, which is always 0"
                 return Clue(f"{hint}: set {right}", source.place(given[0]), key=f"beside:{right}")
     return None
-
-
-def _of(value: object, path: str) -> float:
-    found = value_at(value, path) if isinstance(value, dict) else None
-    return float(found) if isinstance(found, (int, float)) else 0.0
 
 
 def _is_field(node: ast.AST, path: str) -> bool:
