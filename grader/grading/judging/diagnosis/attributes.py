@@ -26,7 +26,6 @@ from grader.grading.judging.diagnosis.names import (
 from grader.grading.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.grading.judging.diagnosis.wiring import (
     called_only,
-    is_read,
     made,
     message_classes,
     received,
@@ -447,13 +446,14 @@ def _result_of_nothing(crash: Crash) -> Clue | None:
 def _stored_as_another(case: Case) -> Clue | None:
     """A callback stores a value under a misspelled name, and the attribute that is read keeps its first value."""
     for source in case.sources.values():
-        own = [dotted for dotted in source.stored if re.fullmatch(r"self\.\w+", dotted)]
         if "getattr" in source.called or "setattr" in source.called:
             continue
+        own = [dotted for dotted in source.stored if re.fullmatch(r"self\.\w+", dotted)]
+        read = {chain(n) for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load)}
         late = {d: [n for n in source.stores(d) if source.function_name(n) != "__init__"] for d in own}
-        never_late = [d.removeprefix("self.") for d in own if not late[d] and is_read(source, d)]
+        never_late = [d.removeprefix("self.") for d in own if not late[d] and d in read]
         for dotted, places in late.items():
-            near = "" if is_read(source, dotted) else closest(dotted.removeprefix("self."), never_late, 0.7)
+            near = "" if dotted in read else closest(dotted.removeprefix("self."), never_late, 0.7)
             if near and len(places) == len(source.stores(dotted)):
                 hint = f"nothing reads {dotted}, and self.{near} never changes: write self.{near}"
                 return Clue(hint, source.place(places[0]), key=f"stored:{dotted}")
