@@ -47,7 +47,7 @@ class Calls:
             return None if found is None else built(kind.Response, found.value, name)
 
         def too_late(_: int) -> StepTimeout:
-            offered = any((end.service, end.type) == (name, interface) for end in self._observed.servers())
+            offered = any(end.type == interface for end in self._observed.graph.ends_of_services("service", name))
             unanswered = f"{name} has a server, which has not answered"
             why = unanswered if offered else self._account.no_server(name, interface)
             return self._account.timeout(f"{name} did not answer", since_ns, {"the service": [why]})
@@ -114,7 +114,7 @@ class Calls:
         """Raise WrongType if all servers of a service are of another type than the test calls it with."""
         __tracebackhide__ = True
         self._timeline.catch_up()
-        servers = [end for end in self._observed.servers() if end.service == service]
+        servers = self._observed.graph.ends_of_services("service", service)
         if servers and all(end.type != interface for end in servers):
             one, expected = servers[0], interface.removesuffix("_SendGoal")
             raise WrongType(f"{name}: {one.node} offers {one.type.removesuffix('_SendGoal')}, the test uses {expected}")

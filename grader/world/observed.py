@@ -16,7 +16,6 @@ from grader.runtime.model.trace import (
     Offer,
     OutputLine,
     Response,
-    ServiceEnd,
 )
 from grader.runtime.serialization import message_type_name
 from grader.world.asking import Received
@@ -102,12 +101,8 @@ class Observed:
         """Return the topics that programs publish on or subscribe to, with their types."""
         return {end.topic: end.type for end in sorted(self.graph.endpoints, key=lambda end: end.topic)}
 
-    def servers(self) -> list[ServiceEnd]:
-        """Return the servers of the programs, without those that every node has."""
-        return [end for end in self.graph.services if end.kind == "service"]
-
     def offers_action(self, name: str) -> bool:
         """Return whether a program offers an action, or has said that it does."""
         service = f"{name}/_action/send_goal"
         offered = (one.name for one in self.everything if isinstance(one, Offer))
-        return any(end.service == service for end in self.servers()) or service in offered
+        return bool(self.graph.ends_of_services("service", service)) or service in offered

@@ -97,7 +97,7 @@ class StudentAccount(RunAccount):
 
     def _advices(self) -> Iterator[str]:
         for offer in self._offers.publishers.values():
-            same = [e for e in self._observed.graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
+            same = self._observed.graph.ends_of_topics("subscription", offer.topic)
             fitting = [e for e in same if e.type == offer.type]
             if not fitting:
                 yield explain_no_subscription(self.trace(), offer.topic, offer.type).hint

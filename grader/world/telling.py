@@ -84,7 +84,7 @@ def silence(graph: GraphSnapshot, topic: str, now_ns: int, other: str) -> NoMess
         now_ns: The time since the test began.
         other: Who else publishes on the topic: the test, or a simulation; empty for nobody.
     """
-    publishers = [end for end in graph.endpoints if end.kind == "publisher"]
+    publishers = graph.ends_of_topics("publisher")
     nodes = sorted({end.node for end in publishers if end.topic == topic})
     if nodes:
         end = ": let time pass" if now_ns == 0 else ""
@@ -103,10 +103,8 @@ def no_server(graph: GraphSnapshot, service: str) -> str:
     if name in OF_EVERY_NODE and node not in graph.nodes:
         what, close = f"there is no node {node}", nearest(node, graph.nodes)
     else:
-        what, close = (
-            f"nobody offers {service}",
-            nearest(service, {end.service for end in service_ends(graph, "service")}),
-        )
+        offered = {end.service for end in graph.ends_of_services("service")}
+        what, close = f"nobody offers {service}", nearest(service, offered)
     return what + (f"\n  hint: did you mean {close}?" if close else "")
 
 
@@ -122,7 +120,7 @@ def advice(graph: GraphSnapshot, topics: Iterable[str]) -> str:
 
 
 def _unheard(graph: GraphSnapshot, topics: Iterable[str]) -> Iterator[tuple[str, str]]:
-    heard = {end.topic for end in graph.endpoints if end.kind == "subscription"}
+    heard = {end.topic for end in graph.ends_of_topics("subscription")}
     for topic in topics:
         if topic not in heard:
             yield topic, nearest(topic, heard) or ""
@@ -205,7 +203,7 @@ def mismatches(graph: GraphSnapshot, sides: Iterable[Sides]) -> Iterator[str]:
     """
     for one in sides:
         for offer in one.publishers:
-            same = [e for e in graph.endpoints if (e.kind, e.topic) == ("subscription", offer.topic)]
+            same = graph.ends_of_topics("subscription", offer.topic)
             yield from _mismatch(same, offer.topic, (offer.type,), f"{offer.node} publishes", "subscribes to")
             fitting = [(e, unmet_policy(offer, e)) for e in same if e.type == offer.type]
             if fitting and all(unmet for _, unmet in fitting):
@@ -213,10 +211,10 @@ def mismatches(graph: GraphSnapshot, sides: Iterable[Sides]) -> Iterator[str]:
                 offered, wanted = unmet or ("", "")
                 yield f"{offer.topic}: {end.node} asks for {wanted}, {offer.node} offers {offered}: no message arrives"
         for topic, kinds in one.hears.items():
-            same = [e for e in graph.endpoints if (e.kind, e.topic) == ("publisher", topic)]
+            same = graph.ends_of_topics("publisher", topic)
             yield from _mismatch(same, topic, kinds, f"{one.who} hears", "publishes")
         for service, kind in one.serves.items():
-            clients = [e for e in service_ends(graph, "client") if e.service == service]
+            clients = graph.ends_of_services("client", service)
             yield from _mismatch(clients, service, (kind,), f"{one.who} serves", "has a client of")
 
 
@@ -229,9 +227,8 @@ def _mismatch(
 
 def apart(graph: GraphSnapshot) -> Iterator[str]:
     """Yield the programs' own publishers and subscriptions that do not find each other although they share a topic."""
-    publishers = [e for e in graph.endpoints if e.kind == "publisher"]
-    for reader in (e for e in graph.endpoints if e.kind == "subscription"):
-        for writer in (e for e in publishers if e.topic == reader.topic):
+    for reader in graph.ends_of_topics("subscription"):
+        for writer in graph.ends_of_topics("publisher", reader.topic):
             if writer.type != reader.type:
                 yield f"{reader.topic}: {writer.node} publishes {writer.type}, {reader.node} expects {reader.type}"
             elif (unmet := unmet_policy(writer, reader)) is not None:
@@ -247,12 +244,12 @@ def waiting(graph: GraphSnapshot, offered: Iterable[str], served: Iterable[str])
         offered: The topics that the test publishes on.
         served: The services that the test offers.
     """
-    written = {e.topic for e in graph.endpoints if e.kind == "publisher"} | {*offered}
-    silent = [e for e in graph.endpoints if e.kind == "subscription" and e.topic not in written]
+    written = {e.topic for e in graph.ends_of_topics("publisher")} | {*offered}
+    silent = [e for e in graph.ends_of_topics("subscription") if e.topic not in written]
     for topic, nodes in _by_name((e.topic, e.node) for e in silent):
         yield f"{nodes} listens to {topic}, where nobody publishes"
-    servers = {e.service for e in graph.services if e.kind == "service"} | {*served}
-    alone = [e for e in graph.services if e.kind == "client" and e.service not in servers]
+    servers = {e.service for e in graph.ends_of_services("service")} | {*served}
+    alone = [e for e in graph.ends_of_services("client") if e.service not in servers]
     for service, nodes in _by_name((e.service, e.node) for e in alone):
         yield f"{nodes} has a client of {service}, which nobody offers"
 
@@ -310,8 +307,3 @@ def timeout(what: str, since_ns: int, now_ns: int, sections: Mapping[str, Iterab
             lines += [f"{title}:", *(f"  {text}" for text in texts)]
     cause = next((text.partition("\n")[0] for text in next(iter(sections.values()), ())), "")
     return StepTimeout("\n".join(lines), f"{first}: {cause}" if cause else first, hint)
-
-
-def service_ends(graph: GraphSnapshot, kind: str) -> list[ServiceEnd]:
-    """Return the servers (`service`) or clients (`client`) in a graph."""
-    return [end for end in graph.services if end.kind == kind]

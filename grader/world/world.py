@@ -638,7 +638,7 @@ class World:
         """Return the services that programs offer, with their types; without those that every node has."""
         __tracebackhide__ = True
         self._timeline.catch_up()
-        return {end.service: end.type for end in self._observed.servers()}
+        return {end.service: end.type for end in self._observed.graph.ends_of_services("service")}
 
     @noted_call
     def graph(self) -> GraphSnapshot:

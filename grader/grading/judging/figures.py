@@ -356,14 +356,14 @@ def _size(graph: GraphSnapshot) -> int:
 def _said(graph: GraphSnapshot) -> str:
     """Return in words what the picture of a graph shows, which leaves out the topics of actions."""
     graph = replace(graph, endpoints=tuple(e for e in graph.endpoints if "/_" not in e.topic))
-    publishers = [e for e in graph.endpoints if e.kind == "publisher"]
+    publishers = graph.ends_of_topics("publisher")
     parts = []
     for publisher in publishers:
-        takers = [e for e in graph.endpoints if e.kind == "subscription" and e.topic == publisher.topic]
+        takers = graph.ends_of_topics("subscription", publisher.topic)
         parts += [f"{publisher.node} publishes {publisher.topic} to {t.node}" for t in takers]
         parts += [] if takers else [f"{publisher.node} publishes {publisher.topic}"]
     served = {p.topic for p in publishers}
-    unserved = [e for e in graph.endpoints if e.kind == "subscription" and e.topic not in served]
+    unserved = [e for e in graph.ends_of_topics("subscription") if e.topic not in served]
     parts += [f"{e.node} subscribes to {e.topic}" for e in unserved]
     offered = [(e, name) for e in graph.services for kind, name in [offered_as(e.service) or ("", "")] if kind]
     parts += [f"{e.node} {'serves' if e.kind == 'service' else 'calls'} {name}" for e, name in offered]

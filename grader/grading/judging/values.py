@@ -384,6 +384,6 @@ def on_student_topic(endpoint: Endpoint) -> bool:
 def heard_from_ns(trace: Trace, topic: str) -> int:
     """Return when the first subscription to a topic appeared; 0 if unknown."""
     for graph in trace.graphs():
-        if any(e.kind == "subscription" and e.topic == topic and on_student_topic(e) for e in graph.endpoints):
+        if any(map(on_student_topic, graph.ends_of_topics("subscription", topic))):
             return graph.t_ns
     return 0

@@ -277,6 +277,14 @@ class GraphSnapshot:
     endpoints: tuple[Endpoint, ...]
     services: tuple[ServiceEnd, ...] = ()
 
+    def ends_of_topics(self, kind: str, topic: str | None = None) -> list[Endpoint]:
+        """Return each `publisher` or `subscription`, of one topic if that is given."""
+        return [end for end in self.endpoints if end.kind == kind and topic in (None, end.topic)]
+
+    def ends_of_services(self, kind: str, service: str | None = None) -> list[ServiceEnd]:
+        """Return each `service` or `client`, of one service if that is given."""
+        return [end for end in self.services if end.kind == kind and service in (None, end.service)]
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -504,13 +512,11 @@ class Trace:
 
     def endpoints(self, kind: str, topic: str | None = None) -> tuple[Endpoint, ...]:
         """Return every `publisher` or `subscription` that was ever in the graph, each once, in order of appearance."""
-        seen = (e for g in self.graphs() for e in g.endpoints if e.kind == kind and topic in (None, e.topic))
-        return tuple(dict.fromkeys(seen))
+        return tuple(dict.fromkeys(end for graph in self.graphs() for end in graph.ends_of_topics(kind, topic)))
 
     def service_ends(self, kind: str, service: str | None = None) -> tuple[ServiceEnd, ...]:
         """Return every `service` or `client` that was ever in the graph, each once, in order of appearance."""
-        seen = (e for g in self.graphs() for e in g.services if e.kind == kind and service in (None, e.service))
-        return tuple(dict.fromkeys(seen))
+        return tuple(dict.fromkeys(end for graph in self.graphs() for end in graph.ends_of_services(kind, service)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -205,7 +205,7 @@ class WallTopicPeers(TopicPeers):
             super()._offer(stream)
 
     def _asked(self, topic: str) -> list[tuple[str, bool]]:
-        asked = [e for e in self._recorder.graph.endpoints if e.kind == "subscription" and e.topic == topic]
+        asked = self._recorder.graph.ends_of_topics("subscription", topic)
         return [(e.type, e.durability == "transient_local") for e in asked]
 
     def _withdraw(self, topic: str, now_ns: int) -> None:
