@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.trace import Fault, FaultKind, LogRecord, Observation, OutputLine
+from grader.runtime.model.wording import unused_name
 from grader.runtime.plan import Plan, PlannedStart
 from grader.runtime.steps import Command, Interrupt, Kill, LaunchFailedError, StartProcesses
 from grader.world import telling
@@ -116,7 +117,7 @@ class RunningPrograms:
     def start(self, one: ProgramStart) -> Program:
         """Start a program, under a name that none has; raises ProgramFailed if it fails at once."""
         __tracebackhide__ = True
-        found, label = one.found, self._unused(one.found.name)
+        found, label = one.found, unused_name(one.found.name, self._programs)
         self._programs[label] = started = self._program(label, found.root)
         self._started_as[label] = one
         before = {*self._observed.graph.nodes}
@@ -164,10 +165,6 @@ class RunningPrograms:
 
     def _program(self, name: str, root: Path) -> Program:
         return Program(name, root, self._signal, self._timeline.catch_up)
-
-    def _unused(self, name: str) -> str:
-        number = 1 + sum(known == name or known.startswith(f"{name} (") for known in self._programs)
-        return name if number == 1 else f"{name} ({number})"
 
     def _signal(self, program: Program, how: str) -> None:
         __tracebackhide__ = True

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
+from itertools import count
 
 #: Longest piece of foreign text in a message, in characters.
 SHOWN_LENGTH = 80
@@ -29,3 +30,10 @@ def first_of(names: Sequence[str]) -> str:
     """Return the first three names as a phrase that ends in `and 2 more`, if there are more."""
     more = [f"{len(names) - 3} more"] if len(names) > 3 else []
     return listed([*map(printable, names[:3]), *more], "and")
+
+
+def unused_name(name: str, used: Container[str]) -> str:
+    """Return a name, with the first number from 2 on that makes it one that is not used, if it is."""
+    if name not in used:
+        return name
+    return next(one for number in count(2) if (one := f"{name} ({number})") not in used)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -12,6 +11,7 @@ from grader.runtime.host.protocol import Claim, ThreadFault
 from grader.runtime.message_classes import plain_fields
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.trace import AssessedTrace, ClockKind, Delivery, Mark, Observation, Offer
+from grader.runtime.model.wording import unused_name
 from grader.runtime.plan import Plan
 from grader.runtime.served_actions import PARTS_OF_ACTIONS, TOPICS_OF_ACTIONS, ServedAction, planned_action
 from grader.runtime.simulation.participant import Moment
@@ -325,9 +325,7 @@ class Runner(ABC):
 
     def _begin_launched(self, service: LaunchService, node: int, now_ns: int) -> None:
         first = service.processes[node]
-        names = {student.name for student in self._students}
-        numbered = (f"{first} ({number})" for number in itertools.count(2))
-        name = first if first not in names else next(one for one in numbered if one not in names)
+        name = unused_name(first, {student.name for student in self._students})
         if first in self._plan.may_exit and name != first:
             self._plan = replace(self._plan, may_exit=(*self._plan.may_exit, name))
         student = self._launches[id(service)][1](service, node, name)

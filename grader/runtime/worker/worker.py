@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import importlib
-import itertools
 import json
 import math
 import os
@@ -29,6 +28,7 @@ from grader.runtime.model.limits import Limits
 from grader.runtime.model.quantities import GIB, MIB, NS_PER_S
 from grader.runtime.model.scenario import is_launch_file
 from grader.runtime.model.trace import AssessedTrace, ClockKind, Delivery, FaultKind, Mark, Message, Observation
+from grader.runtime.model.wording import unused_name
 from grader.runtime.patience import load_per_processor
 from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import from_json, observation_to_json, trace_to_json
@@ -233,9 +233,7 @@ class Worker:
         names: dict[str, str] = {}
         for process, _ in (*made.processes, *made.later):
             label = process.removeprefix(f"{name} ")
-            others = {*used, *names.values()}
-            numbered = (f"{label} ({number})" for number in itertools.count(2))
-            names[process] = label if label not in others else next(one for one in numbered if one not in others)
+            names[process] = unused_name(label, {*used, *names.values()})
         found = expanded(plan, {name: made})
         besides.service = made.service.renamed(names) if made.service is not None else None
         return replace(

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.runtime.model.wording import listed, printable
+from grader.runtime.model.wording import listed, printable, unused_name
 
 
 @given(st.text(st.characters(exclude_categories=())), st.integers(min_value=3, max_value=100))
@@ -37,3 +37,10 @@ def test_what_is_shown(text: str, line: str) -> None:
 def test_a_list_reads_as_a_phrase(names: list[str], phrase: str) -> None:
     """Names are joined as people write them."""
     assert listed(names) == phrase
+
+
+def test_a_name_gets_a_number_only_where_it_is_used() -> None:
+    assert unused_name("a.py", set()) == "a.py"
+    assert unused_name("a.py", {"b.py", "a.py (2)"}) == "a.py"
+    assert unused_name("a.py", {"a.py"}) == "a.py (2)"
+    assert unused_name("a.py", {"a.py", "a.py (2)", "a.py (4)"}) == "a.py (3)"
