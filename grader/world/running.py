@@ -175,7 +175,7 @@ class RunningPrograms:
         if isinstance(command, StartProcesses):
             for name in told["started"]:
                 self._programs.setdefault(name, self._program(name, Path(command.plan.root)))
-        for name, root in told.get("begun", {}).items():  # a launch file has started them, and maybe again
+        for name, root in told.get("begun", {}).items():  # by a launch file, at its start or later
             if name not in self._programs:
                 self._programs[name] = self._program(name, Path(root))
         for one in observations:

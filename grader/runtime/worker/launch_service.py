@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
-from typing import Any
 
 from grader.runtime.host.protocol import LaunchedNode, LaunchHandler, LaunchStep
 from grader.runtime.model.dataclass import dataclass
@@ -61,7 +60,7 @@ class TellReader:
 Order = BeginNode | StopNode | KillNode | DoLater | TellReader
 
 
-@dataclass
+@dataclass(eq=False)
 class LaunchService:
     """One launch file whose nodes run.
 
@@ -216,7 +215,7 @@ class LaunchService:
 class LaunchDue(Event):
     """The time has come for a step of a launch file."""
 
-    service: Any  # the LaunchService, which an event cannot compare
+    service: LaunchService
     step: LaunchStep
 
     @staticmethod

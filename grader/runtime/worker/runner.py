@@ -78,9 +78,7 @@ class Runner(ABC):
         due = events_in_order(arrived for event in planned if (arrived := self._arrival(event)) is not None)
         end_ns = plan.wait_at_most_ns if plan.first_message_on else plan.duration_ns
         self._services_of: dict[str, LaunchService] = {}  # by the processes that a launch file has started
-        self._launches: dict[int, tuple[LaunchService, StartNode]] = {}
-        #: The names of all processes that were started since launch files began, with the folder that each lies in.
-        self.launched: dict[str, str] = {}
+        self._launches: dict[LaunchService, StartNode] = {}
         self._agenda = Agenda(due, dict(plan.starts_ns), end_ns)
         participants = max(plan.limits.participants, len(plan.processes))  # each process needs one
         self._recorder = TraceRecorder(replace(plan.limits, participants=participants))
@@ -104,7 +102,7 @@ class Runner(ABC):
             start: Starts another process of it.
             begins_ns: When it begins, from now on.
         """
-        self._launches[id(service)] = service, start
+        self._launches[service] = start
         self._obey(service, service.begin(), self._time_ns() + begins_ns)
         self._services_of |= dict.fromkeys(service.names, service)
 
@@ -205,7 +203,7 @@ class Runner(ABC):
     def _shut_down(self) -> None:
         """Send the stop signal to every process, and continue until all have ended."""
         self._agenda.shut_down(self._time_ns(), self._plan.shutdown_ns)
-        for service, _ in self._launches.values():
+        for service in self._launches:
             service.interrupted()
         for student in self._students:
             if not student.ended:
@@ -328,10 +326,9 @@ class Runner(ABC):
         name = unused_name(first, {student.name for student in self._students})
         if first in self._plan.may_exit and name != first:
             self._plan = replace(self._plan, may_exit=(*self._plan.may_exit, name))
-        student = self._launches[id(service)][1](service, node, name)
+        student = self._launches[service](service, node, name)
         service.began(node, name)
         self._services_of[name] = service
-        self.launched[name] = service.root
         self._students.append(student)
         self._recorder.allow_participant()
         self._agenda.starts_ns[name] = max(1, now_ns)  # it is marked as one that starts late

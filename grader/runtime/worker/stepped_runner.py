@@ -171,6 +171,10 @@ class SteppedRunner(Runner):
         """Return the exit code of each process that has ended."""
         return {s.name: s.exit_code for s in self._students if s.ended}
 
+    def begun(self) -> dict[str, str]:
+        """Return the folder of each process that a launch file has started which does more than that."""
+        return {name: service.root for name, service in self._services_of.items()}
+
     def full(self) -> str:
         """Return the limit that ended the recording, as a sentence; empty if none did."""
         return self._recorder.full

@@ -180,7 +180,7 @@ class Worker:
                     answer = {"problem": error.message, "launch_failed": isinstance(error, LaunchFailedError)}
                 news = [_compact(o) if plan.working else _whole(o) for o in runner.news()]
                 common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
-                common["begun"] = runner.launched
+                common["begun"] = runner.begun()
                 is_last = isinstance(command, Finish)
                 last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()} if is_last else {}
                 other.tell({**answer, **common, **last})
