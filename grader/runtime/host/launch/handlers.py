@@ -98,44 +98,49 @@ class _Handler:
             )
 
 
-def _of_process(name: str, event: str, argument: str) -> type[_Handler]:
-    """Return the handler of an event of processes; one without an event is left out where it is registered."""
+class _ProcessHandler(_Handler):
+    """A handler of an event of processes; one without an event is left out where it is registered."""
 
-    def begin(self: _Handler, *, target_action: Any = None, handle_once: bool = False, **given: Any) -> None:
-        _Handler.__init__(self, target_action, given.get(argument, []), handle_once=handle_once)
-
-    members = {"event": event, "name": name, "argument": argument, "__init__": begin}
-    return type(name, (_Handler,), {**members, "__doc__": f"The event handler {name} of launch."})
+    def __init__(self, *, target_action: Any = None, handle_once: bool = False, **given: Any) -> None:
+        super().__init__(target_action, given.get(self.argument, []), handle_once=handle_once)
 
 
-def _on_shutdown(self: _Handler, *, on_shutdown: Any, handle_once: bool = False) -> None:
-    _Handler.__init__(self, None, on_shutdown, handle_once=handle_once)
+class OnProcessStart(_ProcessHandler):
+    """A process has started."""
+
+    event, name, argument = "start", "OnProcessStart", "on_start"
 
 
-#: By the name that each has in `launch.event_handlers`.
-HANDLERS: dict[str, Any] = {
-    "OnProcessStart": _of_process("OnProcessStart", "start", "on_start"),
-    "OnProcessExit": _of_process("OnProcessExit", "exit", "on_exit"),
-    "OnExecutionComplete": _of_process("OnExecutionComplete", "complete", "on_completion"),
-    # takes functions alone, which read what a process has written
-    "OnProcessIO": _of_process("OnProcessIO", "", "on_stdout"),
-    "OnShutdown": type(
-        "OnShutdown",
-        (_Handler,),
-        {
-            "event": "shutdown",
-            "name": "OnShutdown",
-            "argument": "on_shutdown",
-            "__init__": _on_shutdown,
-            "__doc__": "The event handler OnShutdown of launch.",
-        },
-    ),
-}
+class OnProcessExit(_ProcessHandler):
+    """A process has ended."""
+
+    event, name, argument = "exit", "OnProcessExit", "on_exit"
+
+
+class OnExecutionComplete(_ProcessHandler):
+    """An action has ended for good."""
+
+    event, name, argument = "complete", "OnExecutionComplete", "on_completion"
+
+
+class OnProcessIO(_ProcessHandler):
+    """A process has written something; it takes functions alone, which read that."""
+
+    name, argument = "OnProcessIO", "on_stdout"
+
+
+class OnShutdown(_Handler):
+    """The launch file is shut down."""
+
+    event, name, argument = "shutdown", "OnShutdown", "on_shutdown"
+
+    def __init__(self, *, on_shutdown: Any, handle_once: bool = False) -> None:
+        super().__init__(None, on_shutdown, handle_once=handle_once)
 
 
 def handle_exits(target: ProcessAction, on_exit: Any, context: Context) -> None:
     """Register what a node does with its own `on_exit`."""
-    HANDLERS["OnProcessExit"](target_action=target, on_exit=on_exit).register(context)
+    OnProcessExit(target_action=target, on_exit=on_exit).register(context)
 
 
 class RegisterEventHandler(Action):
