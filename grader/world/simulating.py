@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from grader.grading.model.wording import first_few
 from grader.runtime.message_classes import built, wanted_class
-from grader.runtime.model.author_files import AuthorMistake
+from grader.runtime.model.author_files import AuthorMistake, line_of
 from grader.runtime.model.errors import HarnessError
 from grader.runtime.model.wording import printable
 from grader.runtime.model.worlds import Sketch
@@ -108,8 +108,9 @@ class SimulationsOfTest:
         try:
             return made_simulation(name, path, content, parameters, self._named.maps)
         except SimulationError as error:
-            if isinstance(error.__cause__, TypeError) and "__init__()" in str(error.__cause__):
-                raise ValueError(f"simulate: {name}: {error.__cause__}") from None  # it does not take what is given
+            cause = error.__cause__
+            if isinstance(cause, TypeError) and not line_of(cause, path, 0):  # it does not take what is given
+                raise ValueError(f"simulate: {name}: {cause}") from None
             raise
         except HarnessError as error:
             raise ValueError(f"simulate: {error.message}") from None
