@@ -20,6 +20,7 @@ from typing import Any
 
 from grader.runtime.model.dataclass import dataclass
 from grader.world.opening import Worlds, open_worlds
+from grader.world.world import World
 
 #: The most runs of a series.
 MOST = 30
@@ -261,18 +262,20 @@ once(1.45, lambda: receipts or out.publish(Int32(data=7)))
 }
 
 
-def is_lost(worlds: Worlds, folder: Path, race: Planted, seed: int, *, swarm: bool) -> bool:
-    """Run the programs of a race once, and return whether one of them has lost it."""
-    with worlds.open(folder, seed=seed, between=race.faults, swarm=swarm) as ros:
-        programs = [ros.run(f"{name}.py") for name in race.programs]
-        ros.advance(SECONDS)
-        return any(log.text == "lost" for program in programs for log in program.logs)
+def is_lost(ros: World, race: Planted) -> bool:
+    """Run the programs of a race, and return whether one of them has lost it."""
+    programs = [ros.run(f"{name}.py") for name in race.programs]
+    ros.advance(SECONDS)
+    return any(log.text == "lost" for program in programs for log in program.logs)
 
 
 def runs_until_lost(worlds: Worlds, folder: Path, race: Planted, series: int, *, swarm: bool) -> int:
     """Return after how many runs a series finds a race; one more than the most if it does not."""
-    found = (number for number in range(MOST) if is_lost(worlds, folder, race, 1000 * series + number, swarm=swarm))
-    return next(found, MOST) + 1
+    for number in range(MOST):
+        with worlds.open(folder, seed=1000 * series + number, between=race.faults, swarm=swarm) as ros:
+            if is_lost(ros, race):
+                return number + 1
+    return MOST + 1
 
 
 def main() -> None:
@@ -294,9 +297,7 @@ def main() -> None:
                 runs = [runs_until_lost(worlds, folder, race, one, swarm=swarm) for one in range(given.series)]
                 cells.append(f"{statistics.median(runs):g} ({min(runs)} to {max(runs)})")
             with worlds.open(folder) as ros:
-                programs = [ros.run(f"{program}.py") for program in race.programs]
-                ros.advance(SECONDS)
-                cells.append("lost" if any(log.text == "lost" for one in programs for log in one.logs) else "not lost")
+                cells.append("lost" if is_lost(ros, race) else "not lost")
             print(f"| {name} | {' | '.join(cells)} |", flush=True)
 
 
