@@ -144,9 +144,9 @@ if TYPE_CHECKING:
     from grader.world.frames import FrameTransform as FrameTransform
     from grader.world.opening import Worlds as Worlds
     from grader.world.opening import open_world as open_world
-    from grader.world.programs import Program as Program
     from grader.world.running import Failure as Failure
     from grader.world.running import Launched as Launched
+    from grader.world.started import Program as Program
     from grader.world.world import World as World
 
 #: The public names by topic and by the module that they are in.
@@ -216,7 +216,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "grader.world.running": "Launched Failure",
         "grader.world.asking": "Received PendingCall GoalHandle GoalResult",
         "grader.world.frames": "FrameTransform",
-        "grader.world.programs": "Program",
+        "grader.world.started": "Program",
         "grader.world.errors": (
             "ProgramFailed StepTimeout NoMessage NoTransform ParameterRejected RecordingDiffers WrongType"
         ),

@@ -11,8 +11,8 @@ from grader.world import telling
 from grader.world.errors import NoMessage, StepTimeout
 from grader.world.observed import Observed
 from grader.world.offering import Offers
-from grader.world.programs import Program
 from grader.world.running import RunningPrograms
+from grader.world.started import Program
 from grader.world.timeline import Timeline
 
 

@@ -16,7 +16,8 @@ from grader.runtime.steps import Command, Interrupt, Kill, LaunchFailedError, St
 from grader.world import telling
 from grader.world.errors import ProgramFailed
 from grader.world.observed import Observed
-from grader.world.programs import Found, Program, Runnable
+from grader.world.programs import Found, Runnable
+from grader.world.started import Program
 from grader.world.timeline import Timeline
 
 #: What fails a test. A program that ends by itself does not: the test can look at its exit code.

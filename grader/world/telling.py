@@ -27,7 +27,7 @@ from grader.runtime.model.trace import (
 )
 from grader.runtime.simulation import Simulation, types_heard
 from grader.world.errors import NoMessage, StepTimeout
-from grader.world.programs import Program
+from grader.world.started import Program
 
 #: How many lines of logs and output a message shows, and how many characters of a line.
 MOST_LINES, LINE_CHARACTERS = 8, 160

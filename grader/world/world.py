@@ -39,9 +39,10 @@ from grader.world.golden import compare_with_kept, write_kept
 from grader.world.names import absolute_name
 from grader.world.observed import Observed
 from grader.world.offering import Offers, length_of, publication, recorded_publications
-from grader.world.programs import Messages, Parameters, Program, Runnable, given_parameters, parameter_values
+from grader.world.programs import Parameters, Runnable, given_parameters, parameter_values
 from grader.world.running import Failure, Launched, ProgramSource, ProgramStart, RunningPrograms
 from grader.world.simulating import NamedSimulations, SimulationsOfTest
+from grader.world.started import Messages, Program
 from grader.world.timeline import StepSession, Timeline
 
 Value = TypeVar("Value")

@@ -13,7 +13,7 @@ from grader.runtime.model.errors import RecordingError, SubmissionError
 from grader.runtime.served_actions import GoalAborted, GoalRejected
 from grader.world.errors import StepTimeout
 from grader.world.opening import Worlds
-from grader.world.programs import Program
+from grader.world.started import Program
 from grader.world.world import World
 
 pytestmark = pytest.mark.ros
