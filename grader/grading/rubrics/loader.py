@@ -642,13 +642,13 @@ def _of_bag(shape: ScenarioShape, limits: Limits, criteria: Iterable[Criterion])
     checks = [criterion.check for criterion in criteria if criterion.scenario == shape.id]
     topics = asked.topics
     if not topics and not any(map(is_authored, checks)):
-        topics = tuple(dict.fromkeys(topic for check in checks for topic in topics_named(check)))
+        topics = tuple(dict.fromkeys(topic for check in checks for topic in _topics_named(check)))
     given = (topic for check in checks for topic in texts_under(check, *roles_of(type(check)).given))
     asked = replace(asked, topics=topics)
     return Scenario(shape.id, (), Span(0), limits=limits, handed_in=asked, given=tuple(dict.fromkeys(given)))
 
 
-def topics_named(check: Check) -> Iterator[str]:
+def _topics_named(check: Check) -> Iterator[str]:
     """Yield the topics that a built-in check reads."""
     roles = roles_of(type(check))
     yield from texts_under(check, *roles.topics, *roles.given, *roles.hears, *roles.speaks)

@@ -41,7 +41,7 @@ HEAD_BYTES = 18
 #: Characters with a meaning in an SQLite URI. rosbags puts the path into one without escaping it.
 _ADDRESS_CHARACTERS = frozenset("?#%")
 
-HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record` writes it"
+_HINT_SOURCE = "name a rosbag2 folder, or a .mcap or .db3 file, as `ros2 bag record` writes it"
 HINT_ROS_1 = "convert it with `rosbags-convert --src FILE.bag --dst FOLDER`"
 HINT_DAMAGED = "copy or record it again; a recorder that was killed leaves a file that `ros2 bag reindex` may fix"
 
@@ -100,7 +100,7 @@ def _source(path: Path) -> Path:
         return _source_in(path) if stat.S_ISDIR(path.stat().st_mode) else _source_file(path)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise RecordingError(
-            f"{one_line(path)}: expected a recording, found no such file or folder", HINT_SOURCE
+            f"{one_line(path)}: expected a recording, found no such file or folder", _HINT_SOURCE
         ) from error
     except PermissionError as error:
         denied = Path(error.filename or path)
@@ -109,7 +109,7 @@ def _source(path: Path) -> Path:
             "let the user who grades read the folder and its files",
         ) from error
     except (OSError, ValueError) as error:
-        raise RecordingError(f"{one_line(path)}: cannot be opened ({one_line(error)})", HINT_SOURCE) from error
+        raise RecordingError(f"{one_line(path)}: cannot be opened ({one_line(error)})", _HINT_SOURCE) from error
 
 
 def _source_in(folder: Path) -> Path:
@@ -132,19 +132,19 @@ def _source_in(folder: Path) -> Path:
     if any(e.suffix == ".bag" for e in entries):
         raise _ros_1(folder)
     found = "compressed files without their metadata.yaml" if storages else "no .mcap or .db3 file"
-    raise RecordingError(f"{one_line(folder)}: expected a rosbag2 recording, found {found}", HINT_SOURCE)
+    raise RecordingError(f"{one_line(folder)}: expected a rosbag2 recording, found {found}", _HINT_SOURCE)
 
 
 def _source_file(path: Path) -> Path:
     if not path.is_file():
-        raise RecordingError(f"{one_line(path)}: expected a recording, found neither a file nor a folder", HINT_SOURCE)
+        raise RecordingError(f"{one_line(path)}: expected a recording, found neither a file nor a folder", _HINT_SOURCE)
     head = _probe(path)
     refuse_ros_1(path, head)
     if path.name == METADATA:
         return _source_in(path.parent)
     if path.suffix not in BAG_ENDINGS:
         found = f"the ending {one_line(path.suffix)}" if path.suffix else "no ending"
-        raise RecordingError(f"{one_line(path)}: expected a .mcap or .db3 file, found {found}", HINT_SOURCE)
+        raise RecordingError(f"{one_line(path)}: expected a .mcap or .db3 file, found {found}", _HINT_SOURCE)
     refuse_empty(path, head)
     return path
 
@@ -334,10 +334,7 @@ def _has_finite_positions(value: Mapping[str, Any]) -> bool:
 
 
 def _ros_1(path: Path) -> RecordingError:
-    return RecordingError(
-        f"{one_line(path)}: expected a rosbag2 recording, found a ROS 1 bag",
-        HINT_ROS_1,
-    )
+    return RecordingError(f"{one_line(path)}: expected a rosbag2 recording, found a ROS 1 bag", HINT_ROS_1)
 
 
 def _count(messages: int) -> str:
