@@ -202,6 +202,11 @@ def _candidates(handed: Sequence[Handed], files: Sequence[_File]) -> Iterator[tu
             yield left, right
 
 
+def _are_several(holders: Iterable[Handed]) -> bool:
+    """Return whether some of the submissions are by different people."""
+    return any(b.name not in a.own for a, b in combinations(holders, 2))
+
+
 def _same(handed: Sequence[Handed]) -> list[SameText]:
     """Return the files that several people handed in byte for byte, without empty ones."""
     holders: dict[str, list[tuple[Handed, ComparedProgram]]] = defaultdict(list)
@@ -216,7 +221,7 @@ def _same(handed: Sequence[Handed]) -> list[SameText]:
             whole=len({tuple(sorted(program.digest for program in h.programs)) for h, _ in who}) == 1,
         )
         for who in holders.values()
-        if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2))
+        if _are_several(h for h, _ in who)
     ]
     return sorted(found, key=lambda same: (-len(same.holders), same.file, same.holders[0].name))
 
@@ -237,7 +242,7 @@ def _same_messages(handed: Sequence[Handed]) -> list[SameMessages]:
     known: dict[tuple[tuple[str, str], ...], tuple[tuple[Handed, str], ...]] = {}
     for (topic, _), found in holders.items():
         who = tuple(found.values())
-        if any(b.name not in a.own for (a, _), (b, _) in combinations(who, 2)):
+        if _are_several(one for one, _ in who):
             key = tuple((one.name, file) for one, file in who)
             known[key] = who
             topics[key].append(topic)
