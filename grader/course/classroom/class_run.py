@@ -111,7 +111,7 @@ def grade_class(
         own = own_conditions(course, intake.entries, matching.people, exercises, conditions)
         decisions = decisions_for(intake.entries, matching, adjustments)  # reports mistakes before hours of grading
         unpacked = course.results / "unpacked"
-        intake = replace(intake, entries=with_renamed_files(intake.entries, decisions, unpacked))
+        intake = replace(intake, entries=with_renamed_files(intake.entries, decisions, unpacked, wanted))
         with scratch_folder() as scratch:
             read = {entry.name: _digest(entry, scratch, wanted) for entry in intake.entries}
         digests = {name: digest for name, (digest, _) in read.items()}

@@ -20,26 +20,27 @@ _RENAMED = "renamed"
 
 
 def with_renamed_files(
-    entries: Sequence[HandedInEntry], decisions: Mapping[str, Decision], unpacked: Path
+    entries: Sequence[HandedInEntry], decisions: Mapping[str, Decision], unpacked: Path, wanted: Sequence[str]
 ) -> tuple[HandedInEntry, ...]:
     """Return the entries, those of which files are renamed with the copy that is graded, in the folder `unpacked`.
 
-    Decisions are given by the name of the entry. Raises ClassError for a file that is not in the submission, and for a
-    name that another file has; HarnessError if a copy cannot be written.
+    Decisions are given by the name of the entry, and `wanted` are the files that exercises ask for. Raises ClassError
+    for a file that is not in the submission, and for a name that another file has; HarnessError if a copy cannot be
+    written.
     """
     shutil.rmtree(unpacked / _RENAMED, ignore_errors=True)
     return tuple(
-        _renamed(entry, decisions[entry.name], unpacked / _RENAMED / entry.name)
+        _renamed(entry, decisions[entry.name], unpacked / _RENAMED / entry.name, wanted)
         if entry.name in decisions and decisions[entry.name].rename and not entry.problem
         else entry
         for entry in entries
     )
 
 
-def _renamed(entry: HandedInEntry, decision: Decision, into: Path) -> HandedInEntry:
+def _renamed(entry: HandedInEntry, decision: Decision, into: Path, wanted: Sequence[str]) -> HandedInEntry:
     try:
         with tempfile.TemporaryDirectory() as scratch:
-            collected = every_file(str(entry.path), Path(scratch))
+            collected = every_file(str(entry.path), Path(scratch), wanted)
     except SubmissionError:
         return entry  # grading refuses it, and says why
     files = list(_with_new_names(collected, decision, entry.name))

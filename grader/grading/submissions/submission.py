@@ -87,15 +87,17 @@ def collect_submission(path: str, wanted: Sequence[str], into: Path) -> Collecte
     return _collect_file(source, wanted, where)
 
 
-def every_file(path: str, into: Path) -> Collected:
-    """Read all files of a submission, also of one without a .py file; without one, those of the only archive in it.
+def every_file(path: str, into: Path, wanted: Sequence[str] = ()) -> Collected:
+    """Read all files of a submission; without a .py file or a wanted one, those of the only archive in it.
 
     Errors are those of `stage_submission`, but for a missing .py file.
     """
-    where, source = printable(path, 500), Path(path)
-    folder = stat.S_ISDIR(_mode(path, where))
-    collected = collect_folder(source, into=into, where=where) if folder else _every_file_of(source, (), where)
-    if _has_python(name for name, _ in collected.files):
+    where, source, limits = printable(path, 500), Path(path), limits_for(wanted)
+    if stat.S_ISDIR(_mode(path, where)):
+        collected = collect_folder(source, into=into, where=where, limits=limits)
+    else:
+        collected = _every_file_of(source, wanted, where)
+    if _has_work([name for name, _ in collected.files], wanted):
         return collected
     from grader.grading.submissions.archives import collect_archive  # noqa: PLC0415 - as below
 
@@ -103,7 +105,7 @@ def every_file(path: str, into: Path) -> Collected:
     if len(archives) != 1:
         return collected
     name, packed = archives[0]
-    return collect_archive(packed, where=f"{where}/{printable(name)}")
+    return collect_archive(packed, where=f"{where}/{printable(name)}", limits=limits)
 
 
 def stage_collected(

@@ -19,8 +19,10 @@ from places import ROOT
 
 from grader.course.classroom.adjustments import Adjustments, Amount, Decision, adjust, read_adjustments
 from grader.course.classroom.gradebook import decision_line
+from grader.course.classroom.intake import take_in
 from grader.course.classroom.outputs import platforms, render_graded
 from grader.course.classroom.platforms import feedback
+from grader.course.classroom.renaming import with_renamed_files
 from grader.grading.app.request import GradeRequest
 from grader.runtime.model.errors import ClassError
 
@@ -409,6 +411,19 @@ def test_a_renamed_file_is_graded_under_its_new_name(tmp_path: Path) -> None:
     without_line(tmp_path / "out", "adjust")
     grade(course(tmp_path / "in", tmp_path / "out"), again)
     assert set(again.graded) == {"ada", "bob", "cleo"}
+
+
+@pytest.mark.parametrize(("wanted", "kept"), [(("score.py",), False), (("score.py", "*.mcap"), True)])
+def test_a_wanted_recording_lies_beside_a_renamed_file(tmp_path: Path, wanted: tuple[str, ...], *, kept: bool) -> None:
+    """Whatever its size, within what is read of recordings."""
+    hand_in(tmp_path / "in", ada=7)
+    (tmp_path / "in/ada/run.mcap").write_bytes(bytes(9 << 20))
+    entries = take_in([tmp_path / "in"], tmp_path / "out", wanted=wanted).entries
+    (entry,) = with_renamed_files(
+        entries, {"ada": Decision(rename={"score.py": "other.py"})}, tmp_path / "unpacked", wanted
+    )
+    assert (entry.path / "other.py").is_file()
+    assert (entry.path / "run.mcap").exists() == kept
 
 
 @pytest.mark.parametrize(
