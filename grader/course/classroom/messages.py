@@ -81,6 +81,7 @@ class Fitness:
 class _Reading:
     files: Files
     notes: tuple[bytes, ...]
+    too_large: tuple[bytes, ...] = ()
 
 
 def pack_message(message: Terms | GradingJob | JobResult | Fitness | Parcel) -> bytes:
@@ -105,7 +106,8 @@ def _path(kind: type[Any], value: Any) -> Any:
 def pack_collected(collected: Collected) -> bytes:
     """Encode the files of a submission."""
     files = tuple((os.fsencode(name), content) for name, content in collected.files)
-    return msgspec.msgpack.encode(_Reading(files, tuple(map(os.fsencode, collected.notes))))
+    notes, too_large = (tuple(map(os.fsencode, names)) for names in (collected.notes, collected.too_large))
+    return msgspec.msgpack.encode(_Reading(files, notes, too_large))
 
 
 def read_collected(data: bytes) -> Collected:
@@ -115,7 +117,7 @@ def read_collected(data: bytes) -> Collected:
     for name, _ in files:
         if os.path.isabs(name) or ".." in name.split("/"):  # noqa: PTH117  a name from elsewhere, not a path here
             raise HarnessError("submission: expected names that stay inside, found one that does not")
-    return Collected(files, tuple(map(os.fsdecode, reading.notes)))
+    return Collected(files, tuple(map(os.fsdecode, reading.notes)), tuple(map(os.fsdecode, reading.too_large)))
 
 
 def travelling_name(path: Path) -> bytes:

@@ -16,6 +16,7 @@ from grader.course.classroom.messages import (
     GradingJob,
     JobResult,
     Terms,
+    pack_collected,
     pack_message,
     read_collected,
     unpack_message,
@@ -24,6 +25,7 @@ from grader.course.classroom.messages import (
 from grader.course.classroom.receiving import write_task
 from grader.course.classroom.sending import job_for, store_result, terms_of
 from grader.course.classroom.store import State
+from grader.grading.submissions.collected import Collected
 from grader.grading.submissions.submission import stage_collected, stage_submission
 from grader.runtime.model.errors import HarnessError, RecordingError, RubricError
 
@@ -50,6 +52,12 @@ def test_a_submission_is_the_same_on_the_other_machine(tmp_path: Path) -> None:
     assert (here.digest, here.notes, here.name) == (there.digest, there.notes, there.name)
     assert (here.files, "link.py" in there.notes[0]) == (there.files, True)
     assert not (tmp_path / "there" / "link.py").exists()
+
+
+def test_a_recording_that_is_too_large_is_known_on_the_other_machine() -> None:
+    """There, too, the student is told so."""
+    collected = Collected(((os.fsdecode(b"\xff.py"), b"x"),), ("a note",), (os.fsdecode(b"\xff.mcap"),))
+    assert read_collected(pack_collected(collected)) == collected
 
 
 def test_no_place_of_this_machine_travels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
