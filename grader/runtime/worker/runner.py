@@ -207,8 +207,7 @@ class Runner(ABC):
             service.interrupted()
         for student in self._students:
             if not student.ended:
-                student.stop_signalled = True
-                self._recorder.add(Mark(self._time_ns(), "stop_signal", student.name))
+                self._note_stop(student, self._time_ns())
                 self._interrupt(student)
         self._run_on()
         for student in self._students:
@@ -336,9 +335,13 @@ class Runner(ABC):
 
     def _stop_launched(self, student: NodeProcess, now_ns: int) -> None:
         if not (student.ended or student.stop_signalled):
-            student.stop_signalled = True
-            self._recorder.add(Mark(now_ns, "stop_signal", student.name))
+            self._note_stop(student, now_ns)
             self._signal_stop(student)
+
+    def _note_stop(self, student: NodeProcess, now_ns: int) -> None:
+        """Note that a process is sent the stop signal."""
+        student.stop_signalled = True
+        self._recorder.add(Mark(now_ns, "stop_signal", student.name))
 
     def _named(self, process: str) -> NodeProcess:
         return next(student for student in self._students if student.name == process)

@@ -16,7 +16,7 @@ from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Event
 from grader.runtime.model.step_event import ProgramStep
-from grader.runtime.model.trace import Fault, FaultKind, Mark, Observation
+from grader.runtime.model.trace import Fault, FaultKind, Observation
 from grader.runtime.plan import Plan
 from grader.runtime.simulation.participant import Moment, Output, Simulation
 from grader.runtime.steps import (
@@ -244,8 +244,7 @@ class SteppedRunner(Runner):
     def _interrupt_now(self, student: NodeProcess) -> None:
         if student.ended or student.stop_signalled:
             return
-        student.stop_signalled = True
-        self._recorder.add(Mark(self._time_ns(), "stop_signal", student.name))
+        self._note_stop(student, self._time_ns())
         self._interrupt(student)
         self._await_end(student)
 
