@@ -131,7 +131,8 @@ def student_environment(process: StudentProcess, home: Path) -> dict[str, str]:
 def account_files(user: int, group: int, home: Path) -> dict[str, bytes]:
     """Return the files of /etc from which the C library knows users and hosts, for a user of a student's process.
 
-    What the program asks Python for is fixed by `grader.runtime.host.machine`; these files say the same to the rest.
+    The program's own user and the addresses of these hosts are fixed by `grader.runtime.host.machine`; these files say
+    the same to C code, and answer what else it asks Python for.
     """
     ids = dict.fromkeys(((USER_ID, USER_ID), (user, group)))
     users = [f"{USER}:x:{number}:{own}:{USER}:{home}:{SHELL}" for number, own in ids]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import builtins
 import contextlib
 import functools
-import grp
 import importlib.machinery
 import importlib.util
 import io
@@ -26,9 +25,7 @@ from typing import Any
 #: Processors of the machine that every program sees: as many as a small laptop has. rclpy's MultiThreadedExecutor
 #: starts so many threads; with a single one, correct programs that call a service in a callback wait forever.
 PROCESSORS = 4
-#: Memory of that machine, in bytes.
-MEMORY_BYTES = 4 << 30
-#: The only user besides root, with its group.
+#: The user that every program runs as, with its group.
 USER, USER_ID, SHELL = "student", 1000, "/bin/bash"
 HOST_NAME, ADDRESS, ADDRESS_6 = "student", "127.0.0.1", "::1"
 LOCAL_NAMES = frozenset({"localhost", HOST_NAME})
@@ -126,22 +123,6 @@ def _install_processors() -> None:
     os.cpu_count = lambda: PROCESSORS
     if hasattr(os, "process_cpu_count"):  # Python 3.13
         os.process_cpu_count = lambda: len(affinity[0])
-    os.getloadavg = lambda: (0.0, 0.0, 0.0)
-    page = os.sysconf("SC_PAGE_SIZE")
-    answers: dict[object, int] = {}
-    for name, answer in (
-        ("SC_NPROCESSORS_CONF", PROCESSORS),
-        ("SC_NPROCESSORS_ONLN", PROCESSORS),
-        ("SC_PHYS_PAGES", MEMORY_BYTES // page),
-        ("SC_AVPHYS_PAGES", MEMORY_BYTES // page),
-    ):
-        answers[name] = answers[os.sysconf_names.get(name)] = answer
-    sysconf = os.sysconf
-
-    def fixed_sysconf(name: str | int, /) -> int:
-        return answers[name] if name in answers else sysconf(name)
-
-    os.sysconf = fixed_sysconf
 
 
 def _install_user() -> None:
@@ -149,35 +130,16 @@ def _install_user() -> None:
         setattr(os, name, lambda: USER_ID)
     os.getresuid = os.getresgid = lambda: (USER_ID, USER_ID, USER_ID)
     os.getgroups = lambda: [USER_ID]
-    os.getlogin = lambda: USER
-    groups = [grp.struct_group((name, "x", number, [])) for name, number in (("root", 0), (USER, USER_ID))]
+    os.getlogin = lambda: USER  # without a terminal, the system knows of no login
+    get = pwd.getpwuid
 
-    def users() -> list[pwd.struct_passwd]:
-        home = os.environ.get("HOME") or "/"
-        rows = (("root", "x", 0, 0, "root", "/root", SHELL), (USER, "x", USER_ID, USER_ID, USER, home, SHELL))
-        return [pwd.struct_passwd(row) for row in rows]
+    @functools.wraps(get)
+    def getpwuid(wanted: Any, /) -> pwd.struct_passwd:
+        if wanted != USER_ID:
+            return get(wanted)
+        return pwd.struct_passwd((USER, "x", USER_ID, USER_ID, USER, os.environ.get("HOME") or "/", SHELL))
 
-    pwd.getpwall = users
-    pwd.getpwuid = _looked_up(pwd.getpwuid, users, "pw_uid", "getpwuid(): uid not found: {}")
-    pwd.getpwnam = _looked_up(pwd.getpwnam, users, "pw_name", "getpwnam(): name not found: {!r}")
-    grp.getgrall = lambda: list(groups)
-    grp.getgrgid = _looked_up(grp.getgrgid, grp.getgrall, "gr_gid", "getgrgid(): gid not found: {}")
-    grp.getgrnam = _looked_up(grp.getgrnam, grp.getgrall, "gr_name", "getgrnam(): name not found: {!r}")
-
-
-def _looked_up(original: Any, rows: Callable[[], list[Any]], key: str, missing: str) -> Any:
-    """Return a function that finds a row by one of its fields, and checks its argument as the original does."""
-
-    @functools.wraps(original)
-    def find(wanted: Any) -> Any:
-        for row in rows():
-            if getattr(row, key) == wanted:
-                return row
-        with contextlib.suppress(KeyError):
-            original(wanted)  # raises what it raises for an argument of another type
-        raise KeyError(missing.format(wanted))
-
-    return find
+    pwd.getpwuid = getpwuid
 
 
 def _install_host() -> None:
@@ -186,25 +148,18 @@ def _install_host() -> None:
     platform._uname_cache = None  # type: ignore[attr-defined]
     platform._platform_cache.clear()  # type: ignore[attr-defined]
     socket.gethostname = lambda: HOST_NAME
-    socket.if_nameindex = lambda: [(1, "lo")]
-    for name in ("gethostbyname", "getaddrinfo", "gethostbyname_ex", "gethostbyaddr"):
-        setattr(socket, name, _resolving(name, getattr(socket, name)))
+    socket.gethostbyname, socket.getaddrinfo = map(_resolving, (socket.gethostbyname, socket.getaddrinfo))
 
 
-def _resolving(name: str, original: Any) -> Any:
+def _resolving(original: Any) -> Any:
     """Return a function of `socket` that knows this host's names without reading any file of the machine."""
 
     @functools.wraps(original)
     def resolve(host: Any = None, *arguments: Any, **named: Any) -> Any:
         plain = host.decode("ascii", "replace") if isinstance(host, (bytes, bytearray)) else host
-        if name == "gethostbyaddr" and plain in (*LOCAL_NAMES, ADDRESS, ADDRESS_6):
-            own = plain if plain in LOCAL_NAMES else "localhost"
-            return own, [], [ADDRESS_6 if plain == ADDRESS_6 else ADDRESS]
-        if name == "gethostbyname_ex" and plain in LOCAL_NAMES:
-            return plain, [], [ADDRESS]
         if plain in LOCAL_NAMES:
             family = named.get("family", arguments[1] if len(arguments) > 1 else 0)
-            host = ADDRESS_6 if name == "getaddrinfo" and family == socket.AF_INET6 else ADDRESS
+            host = ADDRESS_6 if family == socket.AF_INET6 else ADDRESS
         return original(host, *arguments, **named)
 
     return resolve
