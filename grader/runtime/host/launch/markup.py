@@ -211,6 +211,8 @@ class _Reader:
             if given:
                 (name,) = given
                 condition = (IfCondition if name == "if" else UnlessCondition)(substituted(element.needed(name)))
+            if make is None and element.tag not in _LACKING:
+                raise RuntimeError(f"Unrecognized entity of the type: {element.tag}")
             made = Lacking("action", element.tag) if make is None else make(self, element)
         except (AttributeError, RuntimeError, TypeError, ValueError) as error:
             if error.__traceback__ is not None and _is_placed(error, self._path):
@@ -387,6 +389,12 @@ def _setting(kind: Callable[..., Action], *names: str) -> Callable[[_Reader, _El
     return make
 
 
+def _log_info(_: _Reader, element: _Element) -> Action:
+    element.refuse_others(("message", *_CONDITIONS), ())
+    made: Action = ACTIONS["LogInfo"](msg=substituted(element.needed("message")))
+    return made
+
+
 def _set_parameter(_: _Reader, element: _Element) -> Action:
     element.refuse_others(("name", "value", "type", *_CONDITIONS), ())
     made: Action = ROS_ACTIONS["SetParameter"](element.needed("name"), _value(element))
@@ -406,17 +414,25 @@ _TAGS: Mapping[str, Callable[[_Reader, _Element], Action]] = {
     "group": _group,
     "include": _include,
     "let": _setting(ACTIONS["SetLaunchConfiguration"], "name", "value"),
-    "log": _setting(ACTIONS["LogInfo"], "message"),
+    "log": _log_info,
     "node": _node,
     "push_ros_namespace": _setting(ROS_ACTIONS["PushRosNamespace"], "namespace"),
     "ros_timer": _timer,
     "set_env": _setting(ACTIONS["SetEnvironmentVariable"], "name", "value"),
     "set_parameter": _set_parameter,
+    "set_parameters_from_file": _setting(ROS_ACTIONS["SetParametersFromFile"], "filename"),
     "set_remap": _setting(ROS_ACTIONS["SetRemap"], "from", "to"),
     "set_use_sim_time": _set_use_sim_time,
     "shutdown": _shutdown,
     "timer": _timer,
 }
+#: The tags of other actions: of ROS Jazzy itself, and of its packages for Gazebo.
+_LACKING = frozenset(
+    {
+        *("append_env", "load_composable_node", "node_container", "reset", "reset_env", "set_ros_log_dir", "unset_env"),
+        *("gz_server", "gz_spawn_model", "ros_gz_bridge", "ros_gz_sim", "ros_gz_spawn_model"),
+    }
+)
 
 
 class _Text(Substitution):
@@ -537,7 +553,7 @@ _SUBSTITUTIONS: Mapping[str, tuple[Callable[..., Any], int, int]] = {
     "exec-in-pkg": (ROS_SUBSTITUTIONS["ExecutableInPackage"], 2, 2),
     "file-content": (SUBSTITUTIONS["FileContent"], 1, 1),
     "filename": (SUBSTITUTIONS["ThisLaunchFile"], 0, 0),
-    "find-exec": (SUBSTITUTIONS["FindExecutable"], 1, 1),
+    "find-exec": (lambda name: SUBSTITUTIONS["FindExecutable"](name=name), 1, 1),
     "find-pkg-prefix": (ROS_SUBSTITUTIONS["FindPackagePrefix"], 1, 1),
     "find-pkg-share": (ROS_SUBSTITUTIONS["FindPackageShare"], 1, 1),
     "if": (SUBSTITUTIONS["IfElseSubstitution"], 2, 3),

@@ -54,6 +54,16 @@ ALIKE = {
         "- node: {pkg: robot, exec: talker, name: a, namespace: '', param: [{name: x, value: 1}]}",
         "Node(package='robot', executable='talker', name='a', namespace='', parameters=[{'x': 1}])",
     ),
+    "a text in the log": (
+        "<log message='begins'/><node pkg='robot' exec='talker'/>",
+        "- log: {message: begins}\n- node: {pkg: robot, exec: talker}",
+        "LogInfo(msg='begins'), Node(package='robot', executable='talker')",
+    ),
+    "parameters of all nodes from a file": (
+        "<set_parameters_from_file filename='$(find-pkg-share robot)/own.yaml'/><node pkg='robot' exec='talker'/>",
+        "- set_parameters_from_file: {filename: $(find-pkg-share robot)/own.yaml}\n- node: {pkg: robot, exec: talker}",
+        "SetParametersFromFile([FindPackageShare('robot'), '/own.yaml']), Node(package='robot', executable='talker')",
+    ),
     "remappings": (
         "<node pkg='robot' exec='talker'><remap from='x' to='/y'/><remap from='z' to='w'/></node>",
         "- node: {pkg: robot, exec: talker, remap: [{from: x, to: /y}, {from: z, to: w}]}",
@@ -152,7 +162,7 @@ from launch.actions import (DeclareLaunchArgument, ExecuteProcess, GroupAction, 
     SetLaunchConfiguration, TimerAction)
 from launch.conditions import IfCondition, UnlessCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node, PushRosNamespace, SetParameter, SetRemap, SetUseSimTime
+from launch_ros.actions import Node, PushRosNamespace, SetParameter, SetParametersFromFile, SetRemap, SetUseSimTime
 from launch_ros.substitutions import FindPackageShare
 """
 
@@ -199,6 +209,10 @@ LEFT_OUT = {
     "a prefix": ("<node pkg='robot' exec='a' launch-prefix='gdb'/>", ("node_argument", "prefix")),
     "a command": ("<executable cmd='ls -l'/>", ("command", "ls -l")),
     "xacro": ("<node pkg='robot' exec='a' args='$(command xacro)'/>", ("substitution", "Command")),
+    "a search for a program": (
+        "<node pkg='robot' exec='a' args='$(find-exec python3)'/>",
+        ("substitution", "FindExecutable"),
+    ),
 }
 
 
@@ -229,6 +243,12 @@ WRONG = {
         "<launch>\n<node pkg='robot' exec='a' nmae='b'/></launch>",
         2,
         "unexpected in <node>: the attribute 'nmae'",
+    ),
+    "a misspelt element": (
+        "a.launch.xml",
+        "<launch>\n<nod pkg='a'/></launch>",
+        2,
+        "Unrecognized entity of the type: nod",
     ),
     "an inner line": (
         "a.launch.xml",
