@@ -56,6 +56,7 @@ def _manifest(names: Sequence[str]) -> tuple[str, str]:
     code, name = names
     what, hint = _MANIFEST.get(code, ("cannot be used", "compare it with one that `ros2 pkg create` makes"))
     advice = f"write <exec_depend> for <{name}>" if name == "run_depend" else 'remove it, or write format="3"'
+    what = "has a maintainer without an e-mail address" if (code, name) == ("email", "") else what
     return f"{what.format(name)}, {_NOT_ROS}", hint.format(name, advice=advice)
 
 
@@ -113,10 +114,15 @@ def _script_folder(names: Sequence[str]) -> tuple[str, str]:
     return what, f"write into setup.cfg, beside setup.py: {lines}"
 
 
+def _no_script(names: Sequence[str]) -> tuple[str, str]:
+    what = f"the entry point `{names[0]}` is not written as `name = module:function`, so `ros2 run` fails"
+    return what, "write it so, as a text of its own with a comma behind it"
+
+
 def _no_module(names: Sequence[str]) -> tuple[str, str]:
-    script, module, path = names
+    script, module, path, *meant = names
     what = f"the entry point {script} names the module {module}, and there is no {path}, so `ros2 run` fails"
-    return what, "correct the module of the entry point"
+    return what, f"write {meant[0]} in place of {module}" if meant else "correct the module of the entry point"
 
 
 def _no_function(names: Sequence[str]) -> tuple[str, str]:
@@ -154,6 +160,7 @@ _TOLD: Mapping[FlawKind, Callable[[Sequence[str]], tuple[str, str]]] = {
     FlawKind.NO_FILE: _no_file,
     FlawKind.MARKER: _marker,
     FlawKind.SCRIPT_FOLDER: _script_folder,
+    FlawKind.NO_SCRIPT: _no_script,
     FlawKind.NO_MODULE: _no_module,
     FlawKind.NO_FUNCTION: _no_function,
     FlawKind.LEFT_OUT: _left_out,

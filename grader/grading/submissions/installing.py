@@ -185,6 +185,8 @@ class _Examination:
                     yield self._flaw(FlawKind.NO_FOLDER, "setup.py", package, folder, find=find)
             for script, module, function in self.project.scripts:
                 yield from self._entry_point(setup, script, module, function)
+        for script in self.project.build.not_scripts:
+            yield self._flaw(FlawKind.NO_SCRIPT, "setup.py", script, find=(script, "console_scripts"))
         yield from found
 
     def _entry_point(self, setup: SetupCall, script: str, module: str, function: str) -> Iterator[InstallFlaw]:
@@ -193,8 +195,9 @@ class _Examination:
         path = next((p for p in (f"{place}.py", f"{place}/__init__.py") if p in self.files), "")
         package = module if path.endswith("/__init__.py") else module.rpartition(".")[0]
         if not path:
-            if not self._may_come_from_elsewhere(module.partition(".")[0]):
-                yield self._flaw(FlawKind.NO_MODULE, "setup.py", script, module, f"{place}.py", find=find)
+            if not self._may_come_from_elsewhere(setup, module.partition(".")[0]):
+                meant = self._meant(setup, module)
+                yield self._flaw(FlawKind.NO_MODULE, "setup.py", script, module, f"{place}.py", *meant, find=find)
         elif package and package not in (setup.packages or ()):
             marked = f"{_folder_of(setup, package)}/__init__.py"
             lacks = () if marked in self.files else (marked,)
@@ -202,11 +205,19 @@ class _Examination:
         elif not _may_have(self.sources.of(self._path(path)), function.partition(".")[0]):
             yield self._flaw(FlawKind.NO_FUNCTION, "setup.py", script, function, path, find=find)
 
-    def _may_come_from_elsewhere(self, top: str) -> bool:
+    def _meant(self, setup: SetupCall, module: str) -> list[str]:
+        """Return the only installed module whose last name a wrong one has."""
+        last = module.removesuffix(".py").rpartition(".")[2]
+        found = [one for one in setup.packages or () if f"{_folder_of(setup, one)}/{last}.py" in self.files]
+        return [f"{found[0]}.{last}"] if len(found) == 1 else []
+
+    def _may_come_from_elsewhere(self, setup: SetupCall, top: str) -> bool:
         """Return whether a Python package may be another one's: it is declared, or lies in another place here."""
         manifest = self.project.build.manifest
-        begins = self._path(f"{top}/")
-        elsewhere = (f"/{name}" for name in self.every if not name.startswith(begins))
+        # what is in a Python package of its own is not imported without the name of that
+        folders = (top, *(_folder_of(setup, one) for one in setup.packages or ()))
+        own = tuple(self._path(f"{folder}/") for folder in folders)
+        elsewhere = (f"/{name}" for name in self.every if not name.startswith(own))
         ends = (f"/{top}/__init__.py", f"/{top}.py")
         return manifest is None or top in manifest.dependencies or any(name.endswith(ends) for name in elsewhere)
 

@@ -95,6 +95,7 @@ def project_description(files: dict[str, bytes], names: Sequence[str]) -> dict[s
         "cmake_name": by_cmake.project,
         "missing": by_cmake.missing,
         "no_launch": by_cmake.no_launch,
+        "not_scripts": [line for line in map(str.strip, _scripts_of_setup(given)) if line and _script(line) is None],
     }
 
 

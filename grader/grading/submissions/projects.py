@@ -209,6 +209,7 @@ def _build(answer: Mapping[str, Any]) -> PackageBuild:
         cmake_name=next(iter(_strings([answer.get("cmake_name")])), "")[:_TOLD_CHARACTERS],
         missing=tuple(path for text in _strings(answer.get("missing")) if (path := _normal(text))),
         no_launch=answer.get("no_launch") is True,
+        not_scripts=tuple(_short(line) for line in _strings(answer.get("not_scripts")) if not line.startswith("#")),
     )
 
 

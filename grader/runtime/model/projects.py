@@ -52,6 +52,7 @@ class PackageBuild:
         cmake_name: The name in project() of CMakeLists.txt; empty if that is not known.
         missing: The files that CMakeLists.txt installs, whatever its conditions are, and that are not there.
         no_launch: Whether CMakeLists.txt certainly installs no launch file.
+        not_scripts: The console scripts of setup.py that are not written as `name = module:function`.
     """
 
     manifest: PackageManifest | None = None
@@ -60,6 +61,7 @@ class PackageBuild:
     cmake_name: str = ""
     missing: tuple[str, ...] = ()
     no_launch: bool = False
+    not_scripts: tuple[str, ...] = ()
 
 
 class FlawKind(Enum):
@@ -74,6 +76,7 @@ class FlawKind(Enum):
     NO_FILE = "no_file"  # a file that is to be installed is not there
     MARKER = "marker"  # nothing tells ROS that the package is installed
     SCRIPT_FOLDER = "script_folder"  # programs go where `ros2 run` does not look
+    NO_SCRIPT = "no_script"  # an entry point is not written as one
     NO_MODULE = "no_module"  # an entry point names a module that is not there
     NO_FUNCTION = "no_function"  # an entry point names a function that is not there
     LEFT_OUT = "left_out"  # an entry point is in a Python package that is not installed

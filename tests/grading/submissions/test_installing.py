@@ -177,6 +177,24 @@ WRONG: dict[str, tuple[FlawKind, Mapping[str, str | None], str]] = {
         "my_robot/setup.py:18: the entry point talker names the module my_robot.talkr, and there is no "
         "my_robot/talkr.py, so `ros2 run` fails",
     ),
+    "a module without its package": (
+        FlawKind.NO_MODULE,
+        {"setup.py": SETUP.replace("my_robot.talker:", "talker:")},
+        "my_robot/setup.py:18: the entry point talker names the module talker, and there is no talker.py, so "
+        "`ros2 run` fails",
+    ),
+    "a point in place of a colon": (
+        FlawKind.NO_SCRIPT,
+        {"setup.py": SETUP.replace(".talker:main", ".talker.main")},
+        "my_robot/setup.py:18: the entry point `talker = my_robot.talker.main` is not written as "
+        "`name = module:function`, so `ros2 run` fails",
+    ),
+    "no comma between two": (
+        FlawKind.NO_SCRIPT,
+        {"setup.py": SETUP.replace("talker:main'", "talker:main' 'two = my_robot.talker:main'")},
+        "my_robot/setup.py:18: the entry point `talker = my_robot.talker:maintwo = my_robot.talker:main` is not "
+        "written as `name = module:function`, so `ros2 run` fails",
+    ),
     "a missing function": (
         FlawKind.NO_FUNCTION,
         {"setup.py": SETUP.replace(".talker:main", ".talker:run")},
