@@ -1,12 +1,12 @@
 """Counts how many runs find each of ten planted races: with all faults on in each run, and with a drawn part of them.
 
-    .venv/bin/python benchmarks/races.py [RACE...] [--series N]
+    .venv/bin/python benchmarks/races.py [RACE...] [--series N] [--kill]
 
 Each race is two or three small nodes. Each run has a seed of its own, which draws the order of what is ready at one
 instant, and the faults: each program may be paused, and what it publishes may be late or lost. That is `plain`. With
-`swarm`, as with the marker `ros(seeds=N)` of pytest, the seed also draws which of these faults are on. A series tries
-one seed after the other until a node notices that the race was lost. The table has the median over the series, and the
-fewest and the most runs.
+`swarm`, as with the marker `ros(seeds=N)` of pytest, the seed also draws which of these faults are on; `by turns`, it
+does in every other run. A series tries one seed after the other until a node notices that the race was lost. The table
+has the median over the series, and the fewest and the most runs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,13 @@ from grader.world.world import World
 
 #: The most runs of a series.
 MOST = 30
+#: Whether each run of a series draws which faults are on; a series goes through them again and again.
+WAYS = {"plain": (False,), "swarm": (True,), "by turns": (False, True)}
 #: For how many seconds the nodes of a race run, and what happens to each program and to each topic: the same for all.
 SECONDS = 2.5
 OF_PROGRAM = {"pause": (0.0, 0.5)}
+#: With `--kill`, each program may also be killed, which hides every race that it would have lost later.
+KILLED = {"kill": (0.0, SECONDS)}
 OF_TOPIC = {"delay": (0.0, 0.3), "lose": 0.2}
 
 
@@ -42,10 +46,9 @@ class Planted:
     topics: tuple[str, ...]
     programs: Mapping[str, str]
 
-    @property
-    def faults(self) -> dict[str, Mapping[str, Any]]:
-        """What may happen in a run, as the marker's `between`."""
-        return {f"{name}.py": OF_PROGRAM for name in self.programs} | dict.fromkeys(self.topics, OF_TOPIC)
+    def faults(self, of_program: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+        """Return what may happen in a run, as the marker's `between`, with what may happen to each program."""
+        return {f"{name}.py": of_program for name in self.programs} | dict.fromkeys(self.topics, OF_TOPIC)
 
 
 HEAD = """
@@ -269,10 +272,13 @@ def is_lost(ros: World, race: Planted) -> bool:
     return any(log.text == "lost" for program in programs for log in program.logs)
 
 
-def runs_until_lost(worlds: Worlds, folder: Path, race: Planted, series: int, *, swarm: bool) -> int:
+def runs_until_lost(  # noqa: PLR0913 - what makes a series
+    worlds: Worlds, folder: Path, race: Planted, series: int, faults: Mapping[str, Any], swarm: Sequence[bool]
+) -> int:
     """Return after how many runs a series finds a race; one more than the most if it does not."""
     for number in range(MOST):
-        with worlds.open(folder, seed=1000 * series + number, between=race.faults, swarm=swarm) as ros:
+        drawn = swarm[number % len(swarm)]
+        with worlds.open(folder, seed=1000 * series + number, between=faults, swarm=drawn) as ros:
             if is_lost(ros, race):
                 return number + 1
     return MOST + 1
@@ -283,9 +289,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("races", nargs="*", metavar="RACE", help="a part of the name of a race; all without one")
     parser.add_argument("--series", type=int, default=3, help="how many series of seeds")
+    parser.add_argument("--kill", action="store_true", help="each program may also be killed")
     given = parser.parse_args()
+    of_program = OF_PROGRAM | KILLED if given.kill else OF_PROGRAM
     chosen = {name: race for name, race in RACES.items() if not given.races or any(one in name for one in given.races)}
-    print("| race | plain | swarm | without faults |\n|---|---|---|---|")
+    print(f"| race | {' | '.join(WAYS)} | without faults |\n|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as top, open_worlds(Path(top)) as worlds:
         for number, (name, race) in enumerate(chosen.items()):
             folder = Path(top) / str(number)
@@ -293,8 +301,9 @@ def main() -> None:
             for program, text in race.programs.items():
                 (folder / f"{program}.py").write_text(f"{HEAD}{text}\nrclpy.spin(node)\n", encoding="utf-8")
             cells = []
-            for swarm in (False, True):
-                runs = [runs_until_lost(worlds, folder, race, one, swarm=swarm) for one in range(given.series)]
+            faults = race.faults(of_program)
+            for swarm in WAYS.values():
+                runs = [runs_until_lost(worlds, folder, race, one, faults, swarm) for one in range(given.series)]
                 cells.append(f"{statistics.median(runs):g} ({min(runs)} to {max(runs)})")
             with worlds.open(folder) as ros:
                 cells.append("lost" if is_lost(ros, race) else "not lost")
