@@ -24,7 +24,7 @@ from grader.world.world import World
 
 #: The most runs of a series.
 MOST = 30
-#: Whether each run of a series draws which faults are on; a series goes through them again and again.
+#: For each run of a series in turn, whether it draws which faults are on.
 WAYS = {"plain": (False,), "swarm": (True,), "by turns": (False, True)}
 #: For how many seconds the nodes of a race run, and what happens to each program and to each topic: the same for all.
 SECONDS = 2.5
