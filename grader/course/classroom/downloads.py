@@ -29,8 +29,10 @@ from grader.grading.submissions.archives import (
 from grader.grading.submissions.collected import (
     USUAL,
     SubmissionLimits,
-    collision,
+    collisions,
+    is_gradable,
     is_skipped,
+    leads_elsewhere,
     name_problem,
     why_skipped,
 )
@@ -115,11 +117,6 @@ class DownloadLayout:
             (file,) if taken[short] > 1 or short == file else (short,) if is_gradable(short) else (file, short)
             for short, file in zip(plain, files, strict=True)
         ]
-
-
-def is_gradable(name: str) -> bool:
-    """Whether a file may hold what is graded: a program, or an archive of some."""
-    return name.casefold().endswith((".py", *ARCHIVE_SUFFIXES))
 
 
 def download_layout(wanted: str, pattern: str, place: str, labels: Sequence[str]) -> DownloadLayout:
@@ -285,7 +282,9 @@ def _unpack(members: Iterable[Member], into: Path, limits: SubmissionLimits) -> 
     found.strays += [f"{printable(part)}: {why}, so it is not graded" for part, why in overlooked.items()]
     left = MAX_UNPACKED_BYTES
     for part, inside in by_part.items():
-        problem, size = _write_part(inside, top, left, limits)
+        kept, reasons = _storable(inside)
+        found.strays += reasons
+        problem, size = _write_part(kept, top, left, limits)
         left -= size
         if problem:
             found.refused[part] = problem
@@ -350,14 +349,35 @@ def write_without_content(path: Path, most: int) -> None:
         file.truncate(most + 1)
 
 
-def _name_problem(inside: list[tuple[str, Member]]) -> str:
+def _storable(inside: Sequence[tuple[str, Member]]) -> tuple[list[tuple[str, Member]], list[str]]:
+    """Return the files of one student without those that are no programs and have names that some system cannot keep.
+
+    Also returns a reason for each that is left out.
+    """
+    kept = []
+    why = "so it is left out of its submission"
+    reasons = []
+    for name, member in inside:
+        problem = name_problem(name)
+        if problem and member.kind == FILE and not leads_elsewhere(name) and not is_gradable(name):
+            reasons.append(f"{printable(name, 200)}: {problem}, {why}")
+        else:
+            kept.append((name, member))
+    files = [place for place, (_, member) in enumerate(kept) if member.kind == FILE]
+    twins = {}
+    for index, other, twin in collisions([kept[place][0] for place in files]):
+        name = kept[files[index]][0]
+        if name == twin and not is_gradable(name):
+            twins[files[index]] = f"{printable(name, 200)}: something else is called {printable(other, 200)}, {why}"
+    return [one for place, one in enumerate(kept) if place not in twins], [*reasons, *twins.values()]
+
+
+def _name_problem(inside: Sequence[tuple[str, Member]]) -> str:
     for name, member in inside:
         problem = name_problem(name)
         if problem:
             return f"expected plain relative names, found {problem}: {printable(name)}"
         if member.kind not in (FILE, FOLDER):
             return f"expected plain files, found {member.kind}: {printable(name)}"
-    names = [name for name, member in inside if member.kind == FILE]
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    twins = (twice[0], twice[0]) if twice else collision(names)
-    return f"expected different names, found {printable(twins[0])} and {printable(twins[1])}" if twins else ""
+    twins = next(collisions([name for name, member in inside if member.kind == FILE]), None)
+    return f"expected different names, found {printable(twins[1])} and {printable(twins[2])}" if twins else ""

@@ -23,14 +23,14 @@ from grader.course.classroom.downloads import (
     DownloadLayout,
     Named,
     download_layout,
-    is_gradable,
     unpack_download,
     write_without_content,
 )
-from grader.grading.submissions.archives import ARCHIVE_SUFFIXES
 from grader.grading.submissions.collected import (
+    ARCHIVE_SUFFIXES,
     USUAL,
     SubmissionLimits,
+    is_gradable,
     is_skipped_file,
     is_skipped_folder,
     limits_for,

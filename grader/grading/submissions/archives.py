@@ -16,14 +16,17 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 from grader.grading.submissions.collected import (
+    ARCHIVE_SUFFIXES,
     USUAL,
     Collected,
     LeftOut,
     SubmissionLimits,
-    collision,
+    collisions,
     folders_of,
     generated_folders,
+    is_gradable,
     is_skipped,
+    leads_elsewhere,
     name_problem,
 )
 from grader.grading.submissions.foreign_archives import KINDS, UnpackerLimits, foreign_members, has_libarchive
@@ -271,9 +274,6 @@ _RATIO = f"{MAX_RATIO} times the size of the archive"
 #: Number of leading bytes that identify the kind of an archive.
 HEAD_BYTES = BLOCK
 
-#: Suffixes of archives; their content decides the kind.
-ARCHIVE_SUFFIXES = (".zip", ".tar", ".gz", ".tgz", ".bz2", ".tbz2", ".xz", ".txz", ".zst", ".7z", ".rar")
-
 _MAGIC = {
     b"PK\x03\x04": "zip",
     b"PK\x05\x06": "zip",
@@ -309,7 +309,7 @@ def collect_archive(data: bytes, *, where: str, limits: SubmissionLimits = USUAL
         raise SubmissionError(f"{where}: expected at most {limits.packed_bytes >> 20} MiB, found more", FEWER)
     try:
         left = LeftOut()
-        members = _without_generated(_wanted(_members(data, limits)), left, limits)
+        members = _without_generated(_wanted(_members(data, limits), left), left, limits)
         files = tuple(_contents(members, len(data), left, limits))
     except UnusableArchiveError as error:
         raise SubmissionError(f"{where}: {error.problem}", error.hint) from None
@@ -349,16 +349,22 @@ def _allowed(packed: int) -> int:
     return max(RATIO_FREE_BYTES, packed * MAX_RATIO)
 
 
-def _wanted(members: Sequence[Member]) -> Iterator[tuple[str, Member]]:
-    """Yield the student's files with normalised names; raises for members that no archive may contain."""
+def _wanted(members: Sequence[Member], left: LeftOut) -> Iterator[tuple[str, Member]]:
+    """Yield the student's files with normalised names; raises for members that no archive may contain.
+
+    A file that is no program and has a name that some system cannot keep is left out.
+    """
     for member in members:
         name = _relative(member)
         if not name:  # the top folder itself
             continue
         problem = name_problem(name)
-        if problem:
+        if problem and (leads_elsewhere(name) or is_gradable(name)):
             raise UnusableArchiveError(f"expected plain relative names, found {problem}: {printable(member.name)}")
         if member.kind == FOLDER or is_skipped(name):
+            continue
+        if problem:
+            left.add(f"it has {problem}", name)
             continue
         if member.kind != FILE:
             hint = "replace it by the file itself" if member.kind == LINK else REPACK
@@ -391,15 +397,15 @@ def _without_generated(
         raise _too_many(limits.files, "files")
     if any(name.count("/") > limits.depth for name, _ in kept):
         raise _too_many(limits.depth, "folders inside each other")
-    twins = collision([name for name, _ in kept])
-    if twins is not None:
-        found = (
-            f"found {printable(twins[0])} and {printable(twins[1])}"
-            if twins[0] != twins[1]
-            else f"found {printable(twins[0])}"
-        )
-        raise UnusableArchiveError(f"expected different names, {found}{' twice' if twins[0] == twins[1] else ''}")
-    return kept
+    twins = set()
+    for index, other, name in collisions([name for name, _ in kept]):
+        found = f"found {printable(other)} and {printable(name)}" if other != name else f"found {printable(name)} twice"
+        path = kept[index][0]
+        if is_gradable(path) or path != name:
+            raise UnusableArchiveError(f"expected different names, {found}")
+        twins.add(index)
+        left.add(f"something else is called {printable(other)}", path)
+    return [one for index, one in enumerate(kept) if index not in twins]
 
 
 def _contents(

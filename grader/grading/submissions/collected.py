@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
+from itertools import chain
 
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import (
@@ -22,6 +23,9 @@ from grader.runtime.model.limits import (
 )
 from grader.runtime.model.scenario import is_bag_file, wants_bag
 from grader.runtime.model.wording import first_of, printable
+
+#: Suffixes of archives; their content decides the kind.
+ARCHIVE_SUFFIXES = (".zip", ".tar", ".gz", ".tgz", ".bz2", ".tbz2", ".xz", ".txz", ".zst", ".7z", ".rar")
 
 #: A folder with one of these files was made by a tool: a virtual environment, or the output of `colcon build`.
 GENERATED_MARKERS = ("pyvenv.cfg", "COLCON_IGNORE")
@@ -39,12 +43,17 @@ _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²
 _ENDS_ODDLY = re.compile(r"[ .]\Z")
 _CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
-_OBJECTIONS: dict[str, Callable[[str], object]] = {
+#: What no member of an archive may be called: programs that unpack it would not agree on where it lies.
+_LEADING_ELSEWHERE: dict[str, Callable[[str], object]] = {
     "an absolute name": lambda path: path.startswith("/") or _DRIVE.match(path),
     "a name that leads out of the archive": lambda path: ".." in path.split("/"),
-    "a name with a control character": _CONTROLS.search,
+    "a name with a control character": lambda path: "\0" in path,
     "a name with an empty part": lambda path: not {"", "."}.isdisjoint(path.split("/")),
     "a name with a backslash": lambda path: "\\" in path,
+}
+#: What some system cannot keep. macOS calls the icon of a folder `Icon` and a carriage return.
+_ODD: dict[str, Callable[[str], object]] = {
+    "a name with a control character": _CONTROLS.search,
     "a name with a part that ends in a space or a dot": lambda path: any(map(_ENDS_ODDLY.search, path.split("/"))),
     "a name that Windows keeps for a device": lambda path: any(map(_RESERVED.fullmatch, path.split("/"))),
     "a name that is too long": lambda path: _bytes(path) > MAX_PATH_BYTES or _longest_part(path) > MAX_NAME_BYTES,
@@ -138,25 +147,38 @@ def folders_of(path: str) -> Iterator[str]:
 
 def name_problem(path: str) -> str:
     """Describe what is wrong with the name of an archive member, as a phrase; empty if nothing is."""
-    return next((phrase for phrase, is_wrong in _OBJECTIONS.items() if is_wrong(path)), "")
+    wrong = _LEADING_ELSEWHERE.items(), _ODD.items()
+    return next((phrase for phrase, is_wrong in chain(*wrong) if is_wrong(path)), "")
 
 
-def collision(files: Iterable[str]) -> tuple[str, str] | None:
-    """Return two names that cannot both exist on some system, or None.
+def leads_elsewhere(path: str) -> bool:
+    """Return whether the name of an archive member means another place to some program that unpacks it."""
+    return any(is_wrong(path) for is_wrong in _LEADING_ELSEWHERE.values())
+
+
+def is_gradable(name: str) -> bool:
+    """Return whether a file may hold what is graded: a program, or an archive of some, as Windows would name it."""
+    return name.casefold().rstrip(" .").endswith((".py", *ARCHIVE_SUFFIXES))
+
+
+def collisions(files: Sequence[str]) -> Iterator[tuple[int, str, str]]:
+    """Yield the index of each name that cannot exist beside an earlier one on some system, and the two that collide.
 
     These are duplicate names, names that differ only in case or in Unicode composition, and a file where another path
     needs a folder.
     """
     kept: dict[str, tuple[str, bool]] = {}
-    for path in files:
+    for index, path in enumerate(files):
         if _folded(path) in kept:
-            return kept[_folded(path)][0], path
-        kept[_folded(path)] = (path, True)
+            yield index, kept[_folded(path)][0], path
+            continue
         for folder in folders_of(path):
             other, is_file = kept.setdefault(_folded(folder), (folder, False))
             if is_file or other != folder:
-                return other, folder
-    return None
+                yield index, other, folder
+                break
+        else:
+            kept[_folded(path)] = (path, True)
 
 
 def _folded(name: str) -> str:

@@ -396,6 +396,15 @@ def test_what_one_student_packed_badly_spoils_nobody_else(tmp_path: Path, bad: s
     assert not list(tmp_path.rglob("evil*"))
 
 
+@pytest.mark.parametrize("odd", ["Icon\r", "report.", "aux.txt", "A.TXT"])
+def test_an_odd_name_of_a_file_that_is_no_program_refuses_nobody(tmp_path: Path, odd: str) -> None:
+    """It is left out, and that is told."""
+    files = {"ada/a.py": PY, "ada/a.txt": b"1", f"ada/{odd}": b"2", "bob/b.py": PY}
+    intake = found(tmp_path, zipped(tmp_path / "hw.zip", files))
+    assert [(e.problem, contents(e)) for e in intake.entries] == [("", ["a.py", "a.txt"]), ("", ["b.py"])]
+    assert [stray.endswith("so it is left out of its submission") for stray in intake.strays] == [True]
+
+
 def test_what_is_bad_in_a_folder_around_everything_spoils_nobody_else(tmp_path: Path) -> None:
     """Also where the whole class lies in one folder of the download."""
     files = {"hw/": b"", "hw/ada/../../evil.py": PY, "hw/bob/b.py": PY, "hw/cleo/c.py": PY, "hw/scores.csv": b""}
