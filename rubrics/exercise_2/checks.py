@@ -839,6 +839,8 @@ def _labelled_pairs(given: Assignment) -> list[Pair]:
 _SURE = 0.8
 #: Maximum number of a template's texts that are examined for a cause.
 _SAMPLE = 40
+#: In metres: who reads an example sees a difference of this size at once.
+_SEEN_M = 0.1
 #: Maximum number of a template's pairs that are compared with older poses.
 _MOST_PAIRS = 12
 _TWIST = "twist.twist.linear"
@@ -934,9 +936,16 @@ def _variant(groups: Sequence[Group], track: Track) -> Cause | None:
         wanted = variant.wanted()
         sure = next((g for g in groups if g.pairs and _sure(matched(g, track, wanted))), None)
         if sure is not None:
-            first = next((e for e in sure.entries if e.t_ns > track.times_ns[0] + STALE_NS), sure.entries[0])
+            late = [e for e in sure.entries if e.t_ns > track.times_ns[0] + STALE_NS] or sure.entries
+            first = next((e for e in late if _differs(track.pose(track.current(e.t_ns).stop - 1), wanted)), late[0])
             return Cause(variant.name, f"{variant.sentence}: {_difference(first, track)}", variant.hint)
     return None
+
+
+def _differs(pose: Pose, wanted: Wanted) -> bool:
+    """Return whether somebody sees that what is logged is not the position."""
+    first, second = wanted(pose)
+    return max(abs(first - pose.at(X)), abs(second - pose.at(Y))) > _SEEN_M
 
 
 def _sure(group: Group) -> bool:

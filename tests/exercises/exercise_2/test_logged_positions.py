@@ -69,6 +69,13 @@ def test_whole_metres_are_half(write: Writer, credit: Fraction) -> None:
     assert ("have no decimals" in finding.reason) == (credit != 1)
 
 
+def test_an_example_of_an_inverted_sign_shows_it() -> None:
+    """At first y is nearly 0: nothing is wrong to see there."""
+    finding = POSITION.judge(position_logs(WRONG["sign of y"][0], [12.55 + k / 2 for k in range(12)]).trace())
+    assert finding.evidence["cause"] == "sign"
+    assert "inverted: at t = 13.050 s" in finding.reason
+
+
 def test_swapped_positions_keep_their_period() -> None:
     """What is wrong with the values does not cost the period."""
     assert PERIOD.judge(position_logs(WRONG["swapped"][0]).trace()).credit == 1

@@ -301,7 +301,7 @@ class LogsValues:
         # From the plainest cause to the subtlest: no log, few logs, the message before, a wrong factor.
         if len(silent) == len(received):
             return "", rule
-        if len(silent) > len(received) / 2:
+        if silent and (len(silent) > len(received) / 2 or len(silent) == len(unlogged)):
             return f"nothing is logged for {len(silent)} of the messages", rule
         logged = [LoggedNumbers(r.value, self._numbers(r, outputs)) for r in received]
         if any(self._behind(logged, f) for f in self.unit_factors):

@@ -285,6 +285,14 @@ def _logger_arguments(crash: Crash) -> Clue | None:
     return Clue(f"{name} takes one string: put the values into it, {name}(f'... {{value}}')")
 
 
+@crash_rule(r"^ValueError: Logger severity cannot be changed between calls", priority=5065)
+def _level_of_a_line(crash: Crash) -> Clue | None:
+    """One call logs with several levels: `log = logger.warning if low else logger.info`, then `log(...)`."""
+    calls = list(crash.source.on_line(crash.line, ast.Call))
+    hint = "one call keeps its level: call info(...) in one branch of an if, and warning(...) in the other"
+    return Clue(hint, crash.source.place(calls[0])) if calls else Clue(hint)
+
+
 @crash_rule(r"^EOFError|^termios\.error|^_?curses\.error|^IndexError", in_file=False, priority=5070)
 def _unattended(crash: Crash) -> Clue | None:
     """The program waits for keyboard input, or for command line arguments."""

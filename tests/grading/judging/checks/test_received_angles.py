@@ -193,3 +193,11 @@ def test_plain_values_are_asked_by_default() -> None:
     check = LogsValues("simple_subscriber.py", "/joint_commands")
     assert check.judge(hearing(WRONG["only radians"][0]).trace()).credit == 1
     assert check.judge(hearing(WRONG["only degrees"][0]).trace()).credit == 0
+
+
+def test_messages_without_a_log_are_said_to_have_none() -> None:
+    """Every other message is logged, rightly: no factor explains what is missing."""
+    finding = CHECK.judge(hearing(chapter, when=lambda k: k % 2 == 0).trace())
+    assert finding.credit == 0
+    assert finding.reason.endswith("found no log; nothing is logged for 20 of the messages"), finding.reason
+    assert "instead" not in finding.reason
