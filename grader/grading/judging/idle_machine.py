@@ -32,8 +32,9 @@ _SPEEDS, _DELAYS = 24, 8
 def quicker(assessed: AssessedTrace) -> Iterator[Trace]:
     """Yield what an idle machine may have recorded; nothing if the nodes did not wait for a processor.
 
-    A wait makes a program slower all the time, or late by one delay: at its beginning, or with its answers. Whatever
-    the chain of threads is from a program to the recording, a delay takes no longer than all of them waited together.
+    A wait makes a program slower all the time, or late by one delay: at its beginning, with its answers, or with its
+    logs. Whatever the chain of threads is from a program to the recording, a delay takes no longer than all of them
+    waited together.
     """
     trace = assessed.recorded
     ordinary = _ORDINARY_WAIT if trace.clock is ClockKind.WALL else 0
@@ -48,6 +49,7 @@ def quicker(assessed: AssessedTrace) -> Iterator[Trace]:
     for step in range(1, _DELAYS + 1) if late_ns else ():
         yield _begun_earlier(trace, late_ns * step // _DELAYS)
         yield _answered_earlier(trace, late_ns * step // _DELAYS)
+    yield from (_logged_earlier(trace, late_ns * step // _DELAYS) for step in range(1, _DELAYS + 1) if late_ns)
 
 
 def _begun_earlier(trace: Trace, by_ns: int) -> Trace:
@@ -75,6 +77,22 @@ def _answered_earlier(trace: Trace, by_ns: int) -> Trace:
         moved_ns = earlier_ns.setdefault(channel, min(by_ns, one.t_ns - given_ns))
         observations.append(replace(one, t_ns=one.t_ns - moved_ns))
     return replace(trace, observations=tuple(sorted(observations, key=lambda one: one.t_ns)))
+
+
+def _logged_earlier(trace: Trace, by_ns: int) -> Trace:
+    """Return a recording as if whatever a program writes had come right after what was recorded before it.
+
+    A program that waits for a processor between a message and its log may send the next messages at once, to catch up.
+    """
+    before_ns = 0
+    observations: list[Observation] = []
+    for one in trace.observations:
+        moved = one
+        if isinstance(one, (LogRecord, OutputLine)):
+            moved = replace(one, t_ns=max(before_ns, one.t_ns - by_ns))
+        before_ns = moved.t_ns
+        observations.append(moved)
+    return replace(trace, observations=tuple(observations))
 
 
 #: Not sent by anybody: whoever sends something is in the graph before.

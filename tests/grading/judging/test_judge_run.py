@@ -267,6 +267,26 @@ def test_what_a_busy_machine_can_have_delayed_is_undecided_for_every_check(
         assert outcomes(given) == {"own": outcome}
 
 
+@pytest.mark.parametrize(
+    ("every", "waited_s", "outcome"),
+    [(10, 0.0, "not_met"), (10, 1.2, "undecided"), (12, 1.2, "not_met")],
+    ids=["idle machine", "logged late", "wrong anyway"],
+)
+def test_a_log_that_a_busy_machine_can_have_delayed_is_undecided(every: int, waited_s: float, outcome: str) -> None:
+    """A loop that was held up between a message and its log sends the next messages at once, to catch up."""
+    builder = TraceBuilder(FILE, stop_s=10.0)
+    logs_s = []
+    for n in range(100):
+        builder.message(0.31 if n in (1, 2) else 0.1 * n, "/joint_commands", "std_msgs/msg/Float64", {"data": 0.5})
+        logs_s += [0.3 if n == 0 else 0.1 * n] if n % every == 0 else []
+    for t_s in logs_s:
+        builder.log(t_s, "angle")
+    waits: dict[str, Any] = dict.fromkeys(("most_starved_ns", "all_starved_ns"), round(waited_s * SECOND))
+    trace = replace(builder.trace(), clock=ClockKind.WALL, **waits)
+    asked = criterion("logs", CHECKS["logs_every"](FILE, "/joint_commands", 10))
+    assert outcomes(judge_exercise(exercise(asked), {"alone": trace}, handed_in(FILE))) == {"logs": outcome}
+
+
 def test_a_check_without_a_result_leaves_the_points_and_is_not_final() -> None:
     """What was recorded in virtual time counts so far."""
     trace = velocity(20.0, 10.0).trace(unchecked="the machine was too busy for a check")
