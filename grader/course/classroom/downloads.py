@@ -350,7 +350,7 @@ def write_without_content(path: Path, most: int) -> None:
 
 
 def _storable(inside: Sequence[tuple[str, Member]]) -> tuple[list[tuple[str, Member]], list[str]]:
-    """Return the files of one student without those that are no programs and have names that some system cannot keep.
+    """Return the files of one student without those that are not programs and have names that some system cannot keep.
 
     Also returns a reason for each that is left out.
     """

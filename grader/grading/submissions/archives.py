@@ -352,7 +352,7 @@ def _allowed(packed: int) -> int:
 def _wanted(members: Sequence[Member], left: LeftOut) -> Iterator[tuple[str, Member]]:
     """Yield the student's files with normalised names; raises for members that no archive may contain.
 
-    A file that is no program and has a name that some system cannot keep is left out.
+    A file that is not a program and has a name that some system cannot keep is left out.
     """
     for member in members:
         name = _relative(member)

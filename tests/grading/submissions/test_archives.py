@@ -647,7 +647,7 @@ def test_any_archive_is_staged_exactly_or_refused(
 ) -> None:
     """Either each of its files that counts lies in the staging folder, and nothing else anywhere, or nothing does.
 
-    What is no program and has a name that cannot be kept everywhere is missing with a note.
+    What is not a program and has a name that cannot be kept everywhere is missing with a note.
     """
     tmp_path = tmp_path_factory.mktemp("any")
     try:
