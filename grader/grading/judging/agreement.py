@@ -53,6 +53,7 @@ class Aspect(str, Enum):
     ANSWER = "answer"
     LOGS = "logs"
     ENDPOINT = "endpoint"
+    LIMIT = "limit"
     CALLS = "calls"
     END = "end"
 
@@ -107,7 +108,8 @@ def differences(virtual: Trace, wall: Trace, first_message_on: str = "") -> tupl
     ]
     pair = (windows[0], windows[1])
     ends = tuple(_ends(*pair))
-    return (*_traffic(*pair), *_answers(*pair), *_exchanges(*pair), *_logs(*pair), *_endpoints(*pair), *ends)
+    found = (*_traffic(*pair), *_answers(*pair), *_exchanges(*pair), *_logs(*pair), *_endpoints(*pair), *ends)
+    return (*found, *_limits(virtual, wall))
 
 
 def observation_start(trace: Trace, first_message_on: str) -> int:
@@ -143,6 +145,7 @@ _WORDS = {
     Aspect.ANSWER: ("was ", ""),
     Aspect.LOGS: ("logged ", " records"),
     Aspect.ENDPOINT: ("was ", ""),
+    Aspect.LIMIT: ("was ", ""),
     Aspect.CALLS: ("had ", " messages"),
     Aspect.END: ("", ""),
 }
@@ -344,6 +347,14 @@ def _endpoints(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
     for kind, name, type_ in sorted(seen - ever):
         what = f"the {kind} of {name} [{type_}]"
         yield ClockDifference(Aspect.ENDPOINT, what, "not there", "there", by_load=False)
+
+
+def _limits(virtual: Trace, wall: Trace) -> Iterator[ClockDifference]:
+    """Yield that only the second recording was cut off by what a program sent or wrote: little is left to compare."""
+    ends = wall.marks("limit")
+    if ends and not virtual.marks("limit"):
+        found = f"cut off ({ends[0].detail})"
+        yield ClockDifference(Aspect.LIMIT, "the recording", "complete", found, by_load=False)
 
 
 def _keys(graph: GraphSnapshot) -> Iterator[tuple[str, str, str]]:

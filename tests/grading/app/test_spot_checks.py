@@ -25,7 +25,7 @@ from grader.grading.model.run import Run
 from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import AssessedTrace, ClockKind
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Mark
 from grader.runtime.plan import Plan
 from grader.runtime.supervisor.supervisor import Job
 from grader.testing import TraceBuilder
@@ -230,6 +230,16 @@ def test_what_no_busy_machine_can_cause_decides_however_busy_it_was(wall: Assess
         Recorder(wall, wall, wall), virtual=replace(same.trace(), scenario="alone"), reaches=(), share=1.0
     )
     assert decided.clock is ClockKind.WALL
+
+
+def test_a_recording_that_is_cut_off_on_the_wall_clock_agrees_with_nothing() -> None:
+    """Whoever fills it at once would leave nothing to compare."""
+    cut = replace(trace(ClockKind.WALL), stop_ns=S // 2, observations=(Mark(S // 2, "limit", "more than 1 MiB"),))
+    decided = checked(Recorder(cut, cut, cut), reaches=(), share=1.0)
+    assert decided.clock is ClockKind.WALL
+    assert decided.clock_reason.endswith(
+        "the recording was complete in virtual time and cut off (more than 1 MiB) on the wall clock"
+    )
 
 
 def test_slowness_that_a_busy_machine_explains_is_no_difference() -> None:

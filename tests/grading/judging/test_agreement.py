@@ -83,6 +83,7 @@ DIFFER: dict[str, tuple[Aspect, Program]] = {
     "no logs": (Aspect.LOGS, lambda b, s: b if s else _logging(b)),
     "no subscription": (Aspect.ENDPOINT, lambda b, s: b if s else b.subscription("/odom", "nav_msgs/msg/Odometry")),
     "fails": (Aspect.END, lambda b, s: b.fault(1.0, "ValueError: x", kind=FaultKind.EXCEPTION) if s else b),
+    "floods": (Aspect.LIMIT, lambda b, s: b.mark(0.5, "limit", "more than 1 MiB of output") if s else b),
     "fails in virtual time": (Aspect.END, lambda b, s: b if s else b.fault(1.0, "ValueError: x")),
 }
 
