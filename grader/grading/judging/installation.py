@@ -28,10 +28,10 @@ ROS_PACKAGES = frozenset(
     # Not of the desktop, but released for it: programs that import them are right wherever they are installed.
     words(
         "ackermann_msgs apriltag_msgs control_msgs controller_manager controller_manager_msgs gazebo_msgs "
-        "geographic_msgs irobot_create_msgs launch_param_builder mavros_msgs moveit moveit_configs_utils moveit_msgs "
-        "nav2_common nav2_msgs nav2_simple_commander nav_2d_msgs octomap_msgs robot_localization ros_gz_interfaces "
-        "simple_launch slam_toolbox tf2_eigen turtlebot3_msgs turtlebot4_msgs ur_msgs vision_msgs webots_ros2_driver "
-        "xacro"
+        "geographic_msgs irobot_create_msgs launch_pal launch_param_builder launch_pytest mavros_msgs moveit "
+        "moveit_configs_utils moveit_msgs nav2_common nav2_msgs nav2_simple_commander nav_2d_msgs octomap_msgs "
+        "robot_localization ros_gz_bridge ros_gz_interfaces ros_gz_sim simple_launch slam_toolbox tf2_eigen "
+        "tracetools_launch turtlebot3_msgs turtlebot4_msgs ur_msgs vision_msgs webots_ros2_driver xacro"
     )
 )
 

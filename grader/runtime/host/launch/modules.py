@@ -93,15 +93,19 @@ _PACKAGES = frozenset(name.partition(".")[0] for name in MODULES)
 
 #: Packages that launch files import and that are not here: what they make is left out where it is used.
 _ABSENT = (
-    "launch_param_builder",
+    "controller_manager",
     "launch_pal",
+    "launch_param_builder",
+    "launch_pytest",
     "launch_testing",
     "launch_testing_ament_cmake",
     "launch_testing_ros",
     "moveit_configs_utils",
     "nav2_common",
+    "ros_gz_bridge",
     "ros_gz_sim",
     "simple_launch",
+    "tracetools_launch",
     "webots_ros2_driver",
     "xacro",
 )

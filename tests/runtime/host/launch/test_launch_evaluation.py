@@ -358,7 +358,9 @@ def test_what_launch_files_import_is_there(
     assert ([node.executable for node in nodes], left_out) == (["talker"], [])
 
 
-@pytest.mark.parametrize("package", ["xacro", "nav2_common.launch", "moveit_configs_utils"])
+@pytest.mark.parametrize(
+    "package", ["xacro", "nav2_common.launch", "controller_manager.launch_utils", "ros_gz_bridge.actions"]
+)
 def test_what_a_package_that_is_not_here_makes_is_left_out_where_it_is_used(
     described: Callable[..., Described], package: str
 ) -> None:
