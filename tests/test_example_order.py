@@ -21,7 +21,13 @@ ORDER = {
         "reference",
     ],
     "goal_client": ["template", "wrong/all_at_once", "wrong/never_cancels", "wrong/dawdles", "reference"],
-    "wall_follower": ["template", "wrong/left_or_right", "wrong/looks_left_only", "wrong/swings", "reference"],
+    "wall_follower": [
+        "template",
+        "wrong/left_or_right",
+        "wrong/looks_left_only",
+        "wrong/measures_from_its_side",
+        "reference",
+    ],
 }
 #: Each seed draws places, speeds, noise and delays anew.
 SEEDS = 20

@@ -64,6 +64,8 @@ def first_ray_behind(case: Case) -> Clue | None:
     read = ranges_read(case)
     if case.check.topic != "/truth/collisions" or "angle_min" in names(case) or "angle_increment" not in names(case):
         return None
+    if any(isinstance(case.source.parents.get(node), ast.Subscript) for node in read):  # not ray by ray
+        return None
     hint = "the first ray looks back here: the angle of ray k is angle_min + k * angle_increment"
     used = next(node for node in case.source.all(ast.Attribute) if node.attr == "angle_increment")
     return Clue(hint, case.source.place(used)) if read else None
@@ -77,16 +79,20 @@ def silent_while_braking(case: Case) -> Clue | None:
     test = tests[0] if len(tests) == 1 else None
     if case.check.topic != "/truth/collisions" or test is None:
         return None
+    if test.orelse and calls[0] not in {part for statement in test.orelse for part in subtree(statement)}:
+        hint = f"nothing is published here, where 'if {case.source.code(test.test, 50)}' is false, and a robot goes on as"
+        return Clue(f"{hint} it was told last: publish a Twist of zeros", case.source.place(test.orelse[0]))
     hint = f"under 'if {case.source.code(test.test, 50)}' nothing is published otherwise, and a robot goes on as it "
     return Clue(f"{hint}was told last: publish a Twist of zeros too", case.source.place(test))
 
 
 def kept_of_scans(case: Case) -> set[str]:
-    """Return what the callback of the scanner stores, such as `self.nearest`."""
+    """Return what the callback of the scanner stores, such as `self.nearest` or a variable of the file."""
     heard = [item for item in made(case.source, "subscription") if item.type == "LaserScan"]
     inside = [node for item in heard for node in runs(case.source, item)]
     stored = {chain(node) for node in inside if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
-    return {dotted for dotted in stored if dotted.startswith("self.")}
+    shared = {name for node in inside if isinstance(node, ast.Global) for name in node.names}
+    return {dotted for dotted in stored if dotted.startswith("self.")} | shared
 
 
 def comparisons(case: Case) -> Iterator[tuple[ast.Compare, ast.expr, ast.expr]]:
@@ -198,3 +204,74 @@ def passes_on_everything(case: Case) -> Clue | None:
         return None
     hint = f"{case.source.code(sent[0])} passes on what the driver wants, whatever is in the way: publish a command"
     return Clue(f"{hint} of your own", case.source.place(sent[0]))
+
+
+@hint_rule("stays_in_range")
+def free_before_the_first_scan(case: Case) -> Clue | None:
+    """What the scanner will tell begins with a value at which the robot drives."""
+    if case.criterion.id != "blind":
+        return None
+    scanned = {node for item in made(case.source, "subscription") for node in runs(case.source, item)}
+    for name in sorted(kept_of_scans(case)):
+        first = [case.source.parents.get(node) for node in case.source.stored[name] if node not in scanned]
+        begins = [node for node in first if isinstance(node, ast.Assign) and begins_free(case, node.value)]
+        if begins and len(first) == 1:
+            hint = f"{case.source.code(begins[0], 40)} before the first scan, as if the way were free"
+            return Clue(f"{hint}: begin with a value at which the robot stands", case.source.place(begins[0]))
+    return None
+
+
+def begins_free(case: Case, value: ast.expr) -> bool:
+    """Return whether a first value stands for a long way, or for one in which there is nothing."""
+    far = constant_value(case.source, value)
+    endless = chain(value) in ("math.inf", "np.inf", "numpy.inf", "sys.maxsize")
+    text = value.args[0] if isinstance(value, ast.Call) and last_name(value.func) == "float" and value.args else None
+    endless = endless or (isinstance(text, ast.Constant) and str(text.value).lower().lstrip("+") in ("inf", "infinity"))
+    return endless or (far is not None and far.value > 0) or (isinstance(value, ast.Constant) and value.value is False)
+
+
+@hint_rule("stays_in_range")
+def one_side_of_the_angle(case: Case) -> Clue | None:
+    """An angle is compared with one limit, which leaves out one side only."""
+    if case.criterion.id not in ("passes_on", "passes_walls", "hits_nothing", "ignores_dust", "lets_go"):
+        return None
+    found = []
+    for node in case.source.all(ast.Compare):
+        sides = [node.left, *node.comparators]
+        angles = [side for side in sides if isinstance(side, ast.Name | ast.Attribute) and is_angle(last_name(side))]
+        limits = [constant_value(case.source, side) for side in sides if side not in angles]
+        if angles and limits and all(limit is not None and limit.value for limit in limits):
+            found += [(node, last_name(angles[0]), limit.value) for limit in limits]
+    for node, angle, limit in found:
+        others = [other for _, named, other in found if named == angle]
+        if abs(limit) < math.pi and all(other * limit > 0 for other in others):
+            code = case.source.code(node, 40)
+            side = "left" if limit > 0 else "right"
+            hint = f"{code} has one limit, on the {side}, and angles are negative on the right"
+            return Clue(f"{hint}: compare abs({angle})", case.source.place(node))
+    return None
+
+
+def is_angle(name: str) -> bool:
+    """Return whether a variable is called like an angle in radians."""
+    return name.lower() in ("a", "phi", "theta", "alpha", "bearing") or "angle" in name.lower()
+
+
+@hint_rule("stays_in_range", priority=8500)
+def brakes_too_late(case: Case) -> Clue | None:
+    """The robot was told to stop before it hit something, too late for its speed."""
+    if case.check.topic != "/truth/collisions":
+        return None
+    hits = [d.t_ns for d in case.trace.deliveries("/truth/collisions") if d.value["data"]]
+    told = [m.t_ns for m in case.trace.messages("/cmd_vel") if hits and m.t_ns < hits[0]]
+    stops = [m for m in case.trace.messages("/cmd_vel") if m.t_ns in told and not m.value["linear"]["x"]]
+    driven = [m for m in case.trace.messages("/cmd_vel") if m.t_ns in told and m.value["linear"]["x"] > 0]
+    clear = [d for d in case.trace.deliveries("/truth/clearance") if stops and d.t_ns <= stops[-1].t_ns]
+    compared = [node for node, _, _ in comparisons(case)]
+    if not (stops and driven and clear and compared) or stops[-1].t_ns < driven[-1].t_ns:
+        return None
+    first = next(m for m in stops if m.t_ns > driven[-1].t_ns)
+    way = next(d.value["data"] for d in reversed(clear) if d.t_ns <= first.t_ns)
+    speed = driven[-1].value["linear"]["x"]
+    hint = f"this brakes {way:.2f} m from what is in the way, at {speed:.2f} m/s: add the way that the robot takes to"
+    return Clue(f"{hint} stop, speed * speed / (2 * 0.8)", case.source.place(compared[0]))

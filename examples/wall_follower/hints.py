@@ -4,7 +4,7 @@ import ast
 import math
 
 from grader.api import Case, Clue, hint_rule
-from grader.api.unstable import constant_value, given_leaf, last_name
+from grader.api.unstable import constant_value, given_leaf, last_name, parameters
 
 #: More than a full turn is no angle in radians.
 FULL_TURN = 2 * math.pi
@@ -14,6 +14,8 @@ NEAR, FAR = 0.4, 0.6
 LEAST, MOST = -60, 150
 #: A turn rate that is no accident, in rad/s.
 TURNS = 0.1
+#: Through so many variables, arguments and functions a turn rate is followed back.
+DEEPEST = 6
 #: So many commands in moments that leave no doubt, and so large a share of them, tell that the sign is wrong.
 FEWEST, SHARE = 5, 0.8
 
@@ -114,7 +116,7 @@ def angle_in_degrees(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule("stays_in_range")
+@hint_rule("stays_in_range", priority=8510)
 def turns_the_wrong_way(case: Case) -> Clue | None:
     """The robot turns away from a wall that is too far, or towards one that is too near."""
     given = [n for n in given_leaf(case.source, "z") if "angular" in case.source.code(n)]
@@ -127,7 +129,32 @@ def turns_the_wrong_way(case: Case) -> Clue | None:
     if len(clear) < FEWEST or len(wrong) < SHARE * len(clear):
         return None
     hint = f"{len(wrong)} of {len(clear)} times this turned away from a wall that was too far, or towards one too near"
-    return Clue(f"{hint}: positive turns to the left, so turn the sign round", case.source.place(given[0]))
+    place = case.source.place(computed(case, given[0].value) or given[0])
+    return Clue(f"{hint}: positive turns to the left, so turn the sign round", place)
+
+
+def computed(case: Case, value: ast.expr, depth: int = 0) -> ast.expr | None:
+    """Return the sum that a turn rate comes from, also through variables, arguments and functions that limit it."""
+    if isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add | ast.Sub):
+        return value
+    inside: list[ast.expr] = []
+    if isinstance(value, ast.Call):
+        inside = [argument for argument in value.args if not isinstance(argument, ast.Constant)]
+    elif isinstance(value, ast.UnaryOp):
+        inside = [value.operand]
+    elif isinstance(value, ast.BinOp):
+        inside = [value.left, value.right]
+    elif isinstance(value, ast.Name):
+        function = case.source.function_of(value)
+        stores = [node for node in case.source.stored.get(value.id, ()) if case.source.function_of(node) is function]
+        statements = [case.source.parents.get(node) for node in stores]
+        inside = [statement.value for statement in statements if isinstance(statement, ast.Assign)]
+        own = parameters(function) if function is not None else []
+        if value.id in own:
+            place = own.index(value.id) - case.source.is_method(function)
+            inside += [call.args[place] for call in case.source.calls(function.name) if len(call.args) > place]
+    found = (computed(case, one, depth + 1) for one in inside) if depth < DEEPEST else iter(())
+    return next((one for one in found if one is not None), None)
 
 
 def turn_wanted(scan: dict) -> int:
@@ -146,7 +173,7 @@ def turn_wanted(scan: dict) -> int:
     return -1 if distance < NEAR and 0 <= angle <= math.pi / 2 else 0
 
 
-@hint_rule("stays_in_range")
+@hint_rule("stays_in_range", priority=8520)
 def full_left_or_right(case: Case) -> Clue | None:
     """The turn rate is one of two, whatever the distance is."""
     choices = [node for node in case.source.all(ast.IfExp) if _is_opposite(node.body, node.orelse)]

@@ -14,11 +14,13 @@ from grader.grading.judging.diagnosis import (
     callbacks,
     crashes,
     formulas,
+    kept,
     launch_mistakes,
     loading,
     logs,
     misuse,
     rates,
+    scans,
     scopes,
     services,
     silence,
@@ -40,6 +42,8 @@ from grader.runtime.model.trace import AssessedTrace, Fault, Trace, main_not_cal
 #: Modules of rules; each rule says itself where it stands among all.
 _MODULES = (
     simulated,
+    scans,
+    kept,
     launch_mistakes,
     loading,
     scopes,

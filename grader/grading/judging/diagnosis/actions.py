@@ -182,6 +182,18 @@ def _goes_on_when_rejected(case: Case) -> Clue | None:
     return None
 
 
+@hint_rule("sends_goals", "after_goal", priority=3565)
+def _never_asks_whether_accepted(case: Case) -> Clue | None:
+    """The result of a goal is asked for, whether the goal was accepted or not."""
+    source = case.source
+    asked = next(source.calls("get_result_async"), None)
+    if asked is None or not _was_rejected(case) or any(last_name(n) == "accepted" for n in source.names()):
+        return None
+    handle = chain(asked.func.value) if isinstance(asked.func, ast.Attribute) else "the goal handle"
+    hint = f"nothing asks whether the goal was accepted: before {source.code(asked, 50)}, look at {handle}.accepted"
+    return Clue(f"{hint}, and send the goal again if it is false", source.place(asked), key="accepted")
+
+
 def _is_accepted(node: ast.AST) -> bool:
     return isinstance(node, ast.Attribute) and node.attr == "accepted"
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Container
 
 from grader.grading.judging.diagnosis.names import NODE_PROPERTIES, closest
-from grader.grading.judging.diagnosis.rules import Clue, Crash, crash_rule, lines_of
+from grader.grading.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule, lines_of
 from grader.grading.judging.diagnosis.wiring import (
     Made,
     bare_statements,
@@ -40,14 +40,32 @@ def _callback_called(crash: Crash) -> Clue | None:
     result = crash.said(r"not callable|callable object|callback should be either")
     given = [(item.call, item.callback) for item in made(source, "timer", "subscription")]
     given += [(call, argument(call, 2, "callback")) for call in source.calls("create_service")]
+    given += [(call, argument(call, 0, "callback")) for call in source.calls("add_done_callback")]
+    ran = {crash.line, *(line for line, _ in crash.frames())}
     for call, called in given:
         serves = last_name(call.func) == "create_service"
         if not isinstance(called, ast.Call) or not (_returns_nothing(source, called) or serves):
             continue
-        if (result and not serves) or covers(call, crash.line):
+        if (result and not serves) or any(covers(call, line) for line in ran):
             bare = source.code(called.func)
             hint = f"{source.code(called)} calls the function at once: pass {bare}, without the parentheses"
+            if last_name(call.func) == "add_done_callback" and called.args[1:]:
+                rest = ", ".join(source.code(argument_, 30) for argument_ in called.args[1:])
+                hint = f"{source.code(called)} calls the function at once: pass lambda future: {bare}(future, {rest})"
             return Clue(hint, source.place(call))
+    return None
+
+
+@hint_rule(fault=None, priority=4012)
+def _thread_called(case: Case) -> Clue | None:
+    """`Thread(target=node.run())`: the function runs before there is a thread, which then has nothing to do."""
+    for source in case.sources.values():
+        for call in source.calls("Thread"):
+            target = argument(call, 1, "target")
+            if isinstance(target, ast.Call) and _returns_nothing(source, target):
+                bare = source.code(target.func)
+                hint = f"{source.code(target)} runs the function at once, and not in the thread: write target={bare}"
+                return Clue(hint, source.place(call), key=f"thread:{source.file}:{first_line(call)}")
     return None
 
 

@@ -374,6 +374,21 @@ def unheard_topic(case: Case) -> str:
     return "" if there else topic
 
 
+def asked_topics(case: Case) -> set[str]:
+    """Return the topics that a check names, or that its problem is about."""
+    return {*case.topics, *texts_under(case.check, *roles_of(type(case.check)).topics)}
+
+
+def heard_topics(case: Case) -> set[str]:
+    """Return the topics to which nodes of the student subscribe."""
+    return {end.topic for end in student_endpoints(case.trace, "subscription")}
+
+
+def is_told(case: Case) -> bool:
+    """Return whether a check is about a topic of the grader's that no node hears: what a simulation makes of it all."""
+    return any(case.trace.deliveries(topic) for topic in asked_topics(case) - heard_topics(case))
+
+
 def file_for(case: Case, kind: str, topic: str) -> Source:
     """Return the file that should create an endpoint: the only file, or the only one without the topic's other end."""
     if case.process in case.sources:

@@ -37,6 +37,9 @@ from grader.grading.model.exercise import ProblemKind, roles_of, texts_under
 from grader.grading.model.wording import quote
 from grader.runtime.model.dataclass import dataclass
 
+#: What gives a future.
+_FUTURES = ("call_async", "send_goal_async", "get_result_async")
+_ENDS = tuple(f"{name}()" for name in _FUTURES)
 #: What waits for a future, or asks whether it is done.
 _WAITS = {*SPINS, "wait", "done", "add_done_callback", "wait_for_future"}
 
@@ -206,7 +209,7 @@ def _shared_callback_group(case: Case) -> Clue | None:
 
 def _waiting_in(source: Source, place: ast.AST, future: str) -> str:
     """Return what to do about a future in a callback, which must not wait; empty elsewhere."""
-    inside = place in callback_nodes(source)
+    inside = place in source.called_back() or place in callback_nodes(source)
     return f"read the response in a function given to {future}.add_done_callback" if inside else ""
 
 
@@ -215,17 +218,25 @@ def _unawaited(source: Source) -> ast.AST | None:
     for read_ in [*source.calls("result")]:
         function = source.function_of(read_)
         future = chain(read_.func.value) if isinstance(read_.func, ast.Attribute) else ""
-        calls = [c for c in source.calls("call_async") if source.function_of(c) is function]
-        made_here = [c for c in calls if target_of(source, c) == future or future.endswith("call_async()")]
+        calls = [c for c in source.calls(*_FUTURES) if source.function_of(c) is function]
+        made_here = [c for c in calls if target_of(source, c) == future or future.endswith(_ENDS)]
         if len(made_here) != 1 or first_line(made_here[0]) > first_line(read_):
             continue
         scope: ast.AST | None = function if function is not None else source.tree
         inside = reached(source, [scope]) if scope is not None else ()
         waits = [n for n in inside if isinstance(n, (ast.Name, ast.Attribute)) and last_name(n) in _WAITS]
+        waits = [n for n in waits if not _is_for_another(source, n, future)]
         awaited = any(isinstance(n, ast.Await) for n in (ast.walk(scope) if scope is not None else ()))
         if not awaited and not any(first_line(w) <= first_line(read_) for w in waits):
             return read_
     return None
+
+
+def _is_for_another(source: Source, name: ast.AST, future: str) -> bool:
+    """Return whether `spin_until_future_complete` names another future."""
+    call = source.parents.get(name)
+    waited = argument(call, 1, "future") if isinstance(call, ast.Call) and call.func is name else None
+    return last_name(name) == "spin_until_future_complete" and chain(waited) not in ("", future)
 
 
 def _too_early(source: Source) -> Clue | None:

@@ -476,8 +476,13 @@ def _not_spun(unseen: _Unseen) -> Clue | None:
     waits = made(source, "timer") or made(source, "subscription")
     if node is None or spins(source) or not waits or "asyncio" in "".join(source.lines[:60]):
         return None
-    hint = f"nothing spins the node: without rclpy.spin({variable_of(source, node)}) no timer or subscription callback"
-    return Clue(f"{hint} is ever called", source.place(node))
+    name = variable_of(source, node)
+    hint = f"nothing spins the node: without rclpy.spin({name}) no timer or subscription callback is ever called"
+    while_ok = (loop for loop in source.all(ast.While) if any(last_name(n) == "ok" for n in ast.walk(loop.test)))
+    if (loop := next(while_ok, None)) is not None:
+        hint = "nothing spins the node, so no callback is ever called while this loop runs: call"
+        return Clue(f"{hint} rclpy.spin_once({name}, timeout_sec=0.1) in it", source.place(loop))
+    return Clue(hint, source.place(node))
 
 
 @hint_rule("logs_received", priority=8160)

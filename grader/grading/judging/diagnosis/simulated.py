@@ -9,7 +9,17 @@ import ast
 from collections.abc import Iterator
 from itertools import pairwise
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, file_for, hint_rule, silent_topic, unheard_topic
+from grader.grading.judging.diagnosis.rules import (
+    Case,
+    Clue,
+    asked_topics,
+    file_for,
+    heard_topics,
+    hint_rule,
+    is_told,
+    silent_topic,
+    unheard_topic,
+)
 from grader.grading.judging.diagnosis.wiring import (
     Made,
     given_leaf,
@@ -27,7 +37,6 @@ from grader.grading.judging.diagnosis.wiring import (
 from grader.grading.judging.simulations import NotHeard, heard_by_simulations, not_heard
 from grader.grading.judging.source import Source, argument, chain, first_line
 from grader.grading.judging.values import number_at, student_endpoints
-from grader.grading.model.exercise import roles_of, texts_under
 from grader.grading.model.wording import nearest, number, quote
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import seconds
@@ -52,27 +61,17 @@ def _may_explain(found: NotHeard, case: Case) -> bool:
     """Return whether a criterion is about the commands, or about what the simulation makes of them."""
     if case.logs:
         return False
-    topics, heard = _asked_topics(case), _heard(case)
+    topics, heard = asked_topics(case), heard_topics(case)
     if topics & {found.topic, found.end.topic}:
         return True
     return any(case.trace.deliveries(topic) for topic in topics & heard)
-
-
-def _asked_topics(case: Case) -> set[str]:
-    """Return the topics that a check names, or that its problem is about."""
-    return {*case.topics, *texts_under(case.check, *roles_of(type(case.check)).topics)}
-
-
-def _heard(case: Case) -> set[str]:
-    """Return the topics to which nodes of the student subscribe."""
-    return {end.topic for end in student_endpoints(case.trace, "subscription")}
 
 
 @hint_rule(priority=20)
 def _hears_nobody(case: Case) -> Clue | None:
     """A node subscribes to a topic on which nobody publishes, and not to one of the grader's with the same type."""
     silent = silent_topic(case)
-    if case.logs or unheard_topic(case) or not (silent or _is_told(case)):
+    if case.logs or unheard_topic(case) or not (silent or is_told(case)):
         return None
     for deaf in _deaf(case):
         calls = publish_calls(deaf.source)
@@ -114,11 +113,6 @@ def _deaf(case: Case) -> Iterator[_DeafItem]:
 _TRUTH = "/truth/"
 
 
-def _is_told(case: Case) -> bool:
-    """Return whether a check is about a topic of the grader's that no node hears: what a simulation makes of it all."""
-    return any(case.trace.deliveries(topic) for topic in _asked_topics(case) - _heard(case))
-
-
 #: The field by which a robot on wheels drives or turns, and those beside it.
 _BESIDE = {"angular.z": ("angular.x", "angular.y"), "linear.x": ("linear.y", "linear.z")}
 _TWISTS = {"geometry_msgs/msg/Twist": "", "geometry_msgs/msg/TwistStamped": "twist."}
@@ -127,7 +121,7 @@ _TWISTS = {"geometry_msgs/msg/Twist": "", "geometry_msgs/msg/TwistStamped": "twi
 @hint_rule(priority=8300)
 def _beside_the_wheels(case: Case) -> Clue | None:
     """The commands turn around another axis, or go to another side, and never set the field that a robot obeys."""
-    if not _is_told(case):
+    if not is_told(case):
         return None
     for topic in heard_by_simulations(case.trace):
         messages = [m for m in case.trace.messages(topic) if m.type in _TWISTS]
@@ -152,7 +146,7 @@ def _is_field(node: ast.AST, path: str) -> bool:
 @hint_rule(priority=8310)
 def _robot_waits(case: Case) -> Clue | None:
     """A callback sleeps for longer than it takes until the next message, while the robot goes on."""
-    if not (_is_told(case) or silent_topic(case)):
+    if not (is_told(case) or silent_topic(case)):
         return None
     for source in case.sources.values():
         if has_threads(source):

@@ -9,7 +9,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
 SPEED = 0.25
-DISTANCE = 0.5
+DISTANCE = 0.5 + 0.12
 MOST_TURN = 1.2
 
 
@@ -24,7 +24,7 @@ class WallFollower(Node):
     def on_scan(self, scan):
         """Turn until the nearest thing is straight to the left, and at the right distance."""
         distance, angle = nearest(scan)
-        turn = 4.0 * (distance - DISTANCE)
+        turn = 1.5 * (angle - math.pi / 2) + 2.0 * (distance - DISTANCE)
         turn = max(-MOST_TURN, min(MOST_TURN, turn))
         command = Twist()
         command.linear.x = SPEED * (1 - abs(turn) / (2 * MOST_TURN))

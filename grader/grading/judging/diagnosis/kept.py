@@ -1,0 +1,121 @@
+"""Causes in what a node keeps from one callback to the next: a flag, a state or a last value that never changes again.
+
+They are asked late, and only about robots in simulations and clients of actions.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, is_told
+from grader.grading.judging.diagnosis.wiring import names_in
+from grader.grading.judging.source import Source, chain, last_name
+
+_CLIENT_CHECKS = ("sends_goals", "after_goal", "cancels_goal")
+#: How programs call what they keep of the last time.
+_LAST = ("last", "prev", "old")
+
+
+def _sources(case: Case) -> Iterator[Source]:
+    """Yield the files of a robot or of a client of an action, without those that set attributes by their names."""
+    if is_told(case) or case.criterion.check_name in _CLIENT_CHECKS:
+        yield from (s for s in case.sources.values() if not {"setattr", "getattr"} & {*s.called})
+
+
+def _kept(source: Source) -> Iterator[tuple[str, list[ast.Assign], list[ast.Assign]]]:
+    """Yield the attributes that `__init__` sets and something reads, with what sets them there, and elsewhere."""
+    read = {chain(n) for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load)}
+    for dotted in source.stored:
+        if not dotted.startswith("self.") or dotted.count(".") > 1 or dotted not in read:
+            continue
+        statements = [source.parents.get(n) for n in source.stores(dotted)]
+        plain = [s for s in statements if isinstance(s, ast.Assign) and len(s.targets) == 1]
+        first = [s for s in plain if source.function_name(s) == "__init__"]
+        if len(plain) == len(statements) and first:
+            yield dotted, first, [s for s in plain if s not in first]
+
+
+@hint_rule(priority=8400)
+def _never_leaves_a_state(case: Case) -> Clue | None:
+    """A state is compared with its first value, and only ever set to others, in a robot that goes on for ever."""
+    for source in _sources(case):
+        for dotted, first, later in _kept(source):
+            begins = {ast.dump(s.value) for s in first}
+            if len(begins) != 1 or not later or any(not _is_plain(s.value) for s in (*first, *later)):
+                continue
+            asked = [n for n in source.all(ast.Compare) if chain(n.left) == dotted and len(n.ops) == 1]
+            back = [n for n in asked if isinstance(n.ops[0], ast.Eq) and ast.dump(n.comparators[0]) in begins]
+            if not back or begins & {ast.dump(s.value) for s in later} or not is_told(case):
+                continue
+            hint = (
+                f"{dotted} is never {source.code(first[0].value, 30)} again after this: set it back once that is over"
+            )
+            return Clue(hint, source.place(later[-1]), key=f"kept:{dotted}")
+    return None
+
+
+def _is_plain(value: ast.expr) -> bool:
+    """Return whether a value is a number, a text, or a name in capitals or of an enumeration."""
+    return isinstance(value, ast.Constant) or last_name(value).isupper()
+
+
+@hint_rule(priority=8410)
+def _flag_stays(case: Case) -> Clue | None:
+    """A flag is turned round once and never back, or is only set under the condition that it takes on."""
+    for source in _sources(case):
+        for dotted, first, later in _kept(source):
+            begins = {s.value.value for s in first if isinstance(s.value, ast.Constant)}
+            constant = [s for s in later if isinstance(s.value, ast.Constant) and isinstance(s.value.value, bool)]
+            if begins <= {True, False} and len(begins) == 1 and later and len(constant) == len(later):
+                if begins & {s.value.value for s in constant if isinstance(s.value, ast.Constant)}:
+                    continue
+                if not _is_asked_by(source, dotted, constant):
+                    continue
+                begin = next(iter(begins))
+                hint = f"{dotted} is never {begin} again, so this happens once only: set it to {begin} before the next"
+                return Clue(f"{hint} time", source.place(constant[0]), key=f"kept:{dotted}")
+            for statement in later:
+                if len(later) == 1 and _is_condition(source, statement):
+                    hint = f"this sets {dotted} only where {source.code(statement.value, 30)} is true, so it never"
+                    hint += " turns False again: set it each time"
+                    return Clue(hint, source.place(statement), key=f"kept:{dotted}")
+    return None
+
+
+def _is_asked_by(source: Source, dotted: str, statements: list[ast.Assign]) -> bool:
+    """Return whether the conditions around these assignments ask for the flag, so that each runs once only."""
+    return all(any(dotted in names_in(test.test) for test in source.around(s, ast.If)) for s in statements)
+
+
+def _is_condition(source: Source, statement: ast.Assign) -> bool:
+    """Return whether a name is assigned where it is true itself, and in no other case but before the first time."""
+    test = next(source.around(statement, ast.If), None)
+    if not isinstance(statement.value, ast.Name) or test is None or statement not in test.body or test.orelse:
+        return False
+    asked = test.test
+    parts = asked.values if isinstance(asked, ast.BoolOp) and isinstance(asked.op, ast.Or) else [asked]
+    rest = [p for p in parts if not (isinstance(p, ast.Name) and p.id == statement.value.id)]
+    target = chain(statement.targets[0])
+    return len(rest) < len(parts) and all(isinstance(p, ast.Compare) and chain(p.left) == target for p in rest)
+
+
+@hint_rule(priority=8420)
+def _last_value_stays(case: Case) -> Clue | None:
+    """What is called the last value keeps its first one."""
+    for source in _sources(case):
+        for dotted, first, later in _kept(source):
+            name = dotted.removeprefix("self.").lstrip("_").lower()
+            if later or len(first) != 1 or not name.startswith(_LAST):
+                continue
+            used = [
+                n
+                for n in source.all(ast.Attribute)
+                if chain(n) == dotted and isinstance(n.ctx, ast.Load) and source.function_name(n) != "__init__"
+            ]
+            if used:
+                hint = (
+                    f"{dotted} stays {source.code(first[0].value, 20)}, because nothing sets it after __init__: set it"
+                )
+                return Clue(f"{hint} to the new value below", source.place(used[0]), key=f"kept:{dotted}")
+    return None
