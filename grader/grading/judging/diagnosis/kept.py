@@ -9,7 +9,7 @@ import ast
 from collections.abc import Iterator
 
 from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, is_told
-from grader.grading.judging.diagnosis.wiring import names_in
+from grader.grading.judging.diagnosis.wiring import names_called, names_in
 from grader.grading.judging.source import Source, chain, last_name
 
 _CLIENT_CHECKS = ("sends_goals", "after_goal", "cancels_goal")
@@ -62,30 +62,35 @@ def _is_plain(value: ast.expr) -> bool:
 
 @hint_rule(priority=8410)
 def _flag_stays(case: Case) -> Clue | None:
-    """A flag is turned round once and never back, or is only set under the condition that it takes on."""
+    """The flag that a goal is cancelled is never taken back, or a flag is only set where it is true."""
     for source in _sources(case):
         for dotted, first, later in _kept(source):
-            begins = {s.value.value for s in first if isinstance(s.value, ast.Constant)}
-            constant = [s for s in later if isinstance(s.value, ast.Constant) and isinstance(s.value.value, bool)]
-            if begins <= {True, False} and len(begins) == 1 and later and len(constant) == len(later):
-                if begins & {s.value.value for s in constant if isinstance(s.value, ast.Constant)}:
-                    continue
-                if not _is_asked_by(source, dotted, constant):
-                    continue
-                begin = next(iter(begins))
-                hint = f"{dotted} is never {begin} again, so this happens once only: set it to {begin} before the next"
-                return Clue(f"{hint} time", source.place(constant[0]), key=f"kept:{dotted}")
-            for statement in later:
-                if len(later) == 1 and _is_condition(source, statement):
-                    hint = f"this sets {dotted} only where {source.code(statement.value, 30)} is true, so it never"
-                    hint += " turns False again: set it each time"
-                    return Clue(hint, source.place(statement), key=f"kept:{dotted}")
+            if (
+                all(_is_bool(s.value, wanted=False) for s in first)
+                and later
+                and all(_is_bool(s.value, wanted=True) for s in later)
+            ):
+                if all(_cancels_once(source, dotted, s) for s in later):
+                    hint = (
+                        f"{dotted} is never False again, so only the first goal is cancelled: set it to False where the"
+                    )
+                    return Clue(f"{hint} next goal is sent", source.place(later[0]), key=f"kept:{dotted}")
+            elif len(later) == 1 and _is_condition(source, later[0]):
+                hint = (
+                    f"this sets {dotted} only where {source.code(later[0].value, 30)} is true, so it never turns False"
+                )
+                return Clue(f"{hint} again: set it each time", source.place(later[0]), key=f"kept:{dotted}")
     return None
 
 
-def _is_asked_by(source: Source, dotted: str, statements: list[ast.Assign]) -> bool:
-    """Return whether the conditions around these assignments ask for the flag, so that each runs once only."""
-    return all(any(dotted in names_in(test.test) for test in source.around(s, ast.If)) for s in statements)
+def _is_bool(value: ast.expr, *, wanted: bool) -> bool:
+    return isinstance(value, ast.Constant) and value.value is wanted
+
+
+def _cancels_once(source: Source, dotted: str, statement: ast.Assign) -> bool:
+    """Return whether an assignment stands beside the cancelling of a goal, under a condition that asks for the flag."""
+    tests = [test for test in source.around(statement, ast.If) if dotted in names_in(test.test)]
+    return any(names_called(source, test.body) & {"cancel_goal_async", "cancel_goal"} for test in tests)
 
 
 def _is_condition(source: Source, statement: ast.Assign) -> bool:

@@ -114,7 +114,7 @@ def _number_is_no_angle(seen: _Seen) -> Clue | None:
         around = source.parents.get(node)
         turned = isinstance(around, ast.Call) and last_name(around.func) in ("radians", "deg2rad", "degrees")
         times = isinstance(around, ast.BinOp) and isinstance(around.op, (ast.Mult, ast.Add, ast.Sub, ast.Mod))
-        if turned or times or isinstance(around, ast.Compare):
+        if around is not None and (turned or times or isinstance(around, ast.Compare)):
             hint = f"ray {node.id} does not look to {source.code(around, 40)} here, because the first one looks to"
             hint += f" {math.degrees(seen.first_angle):.0f}°: its angle is angle_min + {node.id} * angle_increment"
             return Clue(hint, source.place(around))
@@ -124,14 +124,9 @@ def _number_is_no_angle(seen: _Seen) -> Clue | None:
 def _ray_numbers(seen: _Seen) -> Iterator[tuple[str, Any]]:
     """Yield each variable that runs through the numbers of the rays, with the function that it is in."""
     source = seen.source
-    loops = [(n.target, n.iter) for n in (*source.all(ast.For), *source.all(ast.comprehension))]
-    # comprehensions have no line, so that the source lists none of them
-    loops += [
-        (g.target, g.iter)
-        for kind in (ast.ListComp, ast.GeneratorExp, ast.SetComp, ast.DictComp)
-        for node in source.all(kind)
-        for g in node.generators
-    ]
+    loops = [(node.target, node.iter) for node in source.all(ast.For)]
+    inside: list[ast.ListComp | ast.GeneratorExp] = [*source.all(ast.ListComp), *source.all(ast.GeneratorExp)]
+    loops += [(part.target, part.iter) for one in inside for part in one.generators]
     for target, over in loops:
         call = over if isinstance(over, ast.Call) else None
         read = {chain(n) for n in ast.walk(over) if isinstance(n, (ast.Name, ast.Attribute))} & seen.ranges

@@ -124,3 +124,45 @@ def test_a_value_under_a_misspelled_name_is_told() -> None:
     assert told("stored_as_another", slip) == hint
     for right in (kept, slip + "        self.near = self.naer\n", slip.replace("naer", "scan")):
         assert told("stored_as_another", right) == ""
+
+
+SEES = """
+class Follower(Node):
+    def __init__(self):
+        super().__init__("follower")
+        self.last = 0.0
+        self.pub = self.create_publisher(Twist, "/cmd_vel", 10)
+        self.create_subscription(LaserScan, "/scan", self.seen, 10)
+
+    def seen(self, scan):
+        found = []
+        for k, r in enumerate(scan.ranges):
+            angle = scan.angle_min + k * scan.angle_increment
+            if scan.range_min <= r <= scan.range_max:
+                x, y = r * math.cos(angle), r * math.sin(angle)
+                found.append((x, y))
+        self.last = min(found)[0]
+        command = Twist()
+        command.linear.x = self.last
+        command.angular.z = math.atan2(y, x)
+        self.pub.publish(command)
+"""
+
+
+@pytest.mark.parametrize("rule", ["empty_slice", "number_is_no_angle", "nan_is_kept", "sine_for_cosine"])
+def test_a_program_that_reads_a_scan_rightly_is_left_alone(rule: str) -> None:
+    """Whatever else it does wrong."""
+    assert told(rule, SEES) == ""
+
+
+@pytest.mark.parametrize("rule", ["arguments_of_atan2", "last_value_stays", "flag_stays", "never_leaves_a_state"])
+def test_a_program_whose_values_change_is_left_alone(rule: str) -> None:
+    """Neither a value that each scan sets nor a right angle is taken for a mistake."""
+    assert told(rule, SEES) == ""
+
+
+def test_a_last_value_that_nothing_sets_is_told() -> None:
+    """With the line that reads it."""
+    assert told("last_value_stays", SEES.replace("self.last = min(found)[0]", "nearest = min(found)[0]")).startswith(
+        "18: self.last stays 0.0"
+    )
