@@ -38,7 +38,7 @@ def _kept(source: Source) -> Iterator[tuple[str, list[ast.Assign], list[ast.Assi
 
 @hint_rule(priority=8400)
 def _never_leaves_a_state(case: Case) -> Clue | None:
-    """A state is compared with its first value, and only ever set to others, in a robot that goes on for ever."""
+    """A state is compared with its first value, and only set to others later, in a robot that has no end."""
     for source in _sources(case):
         for dotted, first, later in _kept(source):
             begins = {ast.dump(s.value) for s in first}

@@ -1,4 +1,4 @@
-"""Causes in how a program reads a laser scan: readings that are none, rays that look elsewhere, sides taken for ahead.
+"""Causes in how a program reads a laser scan: readings to leave out, rays that look elsewhere, sides taken for ahead.
 
 They are asked late: an exercise with a scanner may have rules of its own about what it asks for.
 """
