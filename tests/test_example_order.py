@@ -24,7 +24,7 @@ ORDER = {
     "wall_follower": [
         "template",
         "wrong/left_or_right",
-        "wrong/looks_left_only",
+        "wrong/stays_in_the_corner",
         "wrong/measures_from_its_side",
         "reference",
     ],
