@@ -480,9 +480,18 @@ def _not_spun(unseen: _Unseen) -> Clue | None:
     hint = f"nothing spins the node: without rclpy.spin({name}) no timer or subscription callback is ever called"
     while_ok = (loop for loop in source.all(ast.While) if any(last_name(n) == "ok" for n in ast.walk(loop.test)))
     if (loop := next(while_ok, None)) is not None:
-        hint = "nothing spins the node, so no callback is ever called while this loop runs: call"
-        return Clue(f"{hint} rclpy.spin_once({name}, timeout_sec=0.1) in it", source.place(loop))
+        hint = "nothing spins the node, so no callback is ever called while this loop runs: "
+        if all(_only_waits(statement) for statement in loop.body):
+            return Clue(f"{hint}write rclpy.spin({name}) in place of the loop", source.place(loop))
+        return Clue(f"{hint}call rclpy.spin_once({name}, timeout_sec=0.1) in it", source.place(loop))
     return Clue(hint, source.place(node))
+
+
+def _only_waits(statement: ast.stmt) -> bool:
+    """Return whether a statement does nothing but let time pass."""
+    if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
+        return last_name(statement.value.func) == "sleep"
+    return isinstance(statement, (ast.Pass, ast.Continue))
 
 
 @hint_rule("logs_received", priority=8160)
