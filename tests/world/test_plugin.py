@@ -434,7 +434,7 @@ def generate_launch_description():
         assert "the event handler OnProcessExit was left out: only lists of actions" in text
 
 
-BESIDE = """
+IMPORTS_PLAINLY = """
 def test_that_passes(ros):
     ros.run("talk/talker")
     ros.advance(1.0)
@@ -474,7 +474,7 @@ def test_an_import_that_fails_once_the_package_is_installed_is_told(pytester: py
         path = pytester.path / name
         path.parent.mkdir(exist_ok=True)
         path.write_text(text, encoding="utf-8")
-    pytester.makepyfile(test_it=BESIDE)
+    pytester.makepyfile(test_it=IMPORTS_PLAINLY)
     result = pytester.runpytest_subprocess("-p", "grader.pytest_plugin", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1, failed=1, warnings=1)
     told = "import numbers_of_it finds numbers_of_it.py beside it with `python3` only, not with `ros2 run`"
