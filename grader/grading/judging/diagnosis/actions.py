@@ -45,7 +45,7 @@ from grader.grading.model.wording import nearest, number, quote
 from grader.runtime.model.quantities import seconds
 
 #: The checks of a client, by their names in rubrics.
-_CHECKS = ("sends_goals", "after_goal", "cancels_goal")
+CLIENT_CHECKS = ("sends_goals", "after_goal", "cancels_goal")
 #: What sends a goal, at once or in time.
 _SENDS = ("send_goal_async", "send_goal")
 _WAITS = ("wait_for_server", "server_is_ready")
@@ -61,7 +61,7 @@ _ORDERS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
 }
 
 
-@hint_rule(*_CHECKS, problem=ProblemKind.OTHER_NAME, priority=3510)
+@hint_rule(*CLIENT_CHECKS, problem=ProblemKind.OTHER_NAME, priority=3510)
 def _other_action(case: Case) -> Clue | None:
     """A client of an action has another name."""
     source, wanted = case.source, case.check.action
@@ -77,7 +77,7 @@ def _other_action(case: Case) -> Clue | None:
     return Clue(hint, source.place(origin), key=f"action:{source.file}:{call.lineno}")
 
 
-@hint_rule(*_CHECKS, problem=ProblemKind.SILENT, priority=3520)
+@hint_rule(*CLIENT_CHECKS, problem=ProblemKind.SILENT, priority=3520)
 def _no_goal_sent(case: Case) -> Clue | None:
     """There is a client, and no goal: nothing sends one, nothing calls what does, or the server is not there yet."""
     source = case.source
@@ -100,7 +100,7 @@ def _no_goal_sent(case: Case) -> Clue | None:
     return Clue(f"{hint}.wait_for_server() before {source.code(sends[0], 50)}", source.place(sends[0]), key="no_goal")
 
 
-@hint_rule(*_CHECKS, "logs_values", priority=3530)
+@hint_rule(*CLIENT_CHECKS, "logs_values", priority=3530)
 def _waits_for_a_goal(case: Case) -> Clue | None:
     """A callback waits for what can only arrive once it has returned, or nobody spins while a goal is sent."""
     source = case.source
@@ -127,7 +127,7 @@ def _waits_for_a_goal(case: Case) -> Clue | None:
     return Clue(f"{hint}: use {code}.add_done_callback(...)", source.place(spun), key="waits_for_goal")
 
 
-@hint_rule(*_CHECKS, fault=None, priority=3540)
+@hint_rule(*CLIENT_CHECKS, fault=None, priority=3540)
 def _timer_never_ends(case: Case) -> Clue | None:
     """A timer that a callback starts sends a goal each time."""
     source = case.source
@@ -162,7 +162,7 @@ def _goal_timer_too_slow(case: Case) -> Clue | None:
     return None
 
 
-@hint_rule(*_CHECKS, priority=3560)
+@hint_rule(*CLIENT_CHECKS, priority=3560)
 def _goes_on_when_rejected(case: Case) -> Clue | None:
     """What is done about a rejected goal is followed by what is done about an accepted one."""
     source = case.source

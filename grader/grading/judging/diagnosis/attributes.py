@@ -25,9 +25,11 @@ from grader.grading.judging.diagnosis.names import (
 )
 from grader.grading.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
 from grader.grading.judging.diagnosis.wiring import (
+    attributes_read,
     called_only,
     made,
     message_classes,
+    names_attributes_by_text,
     received,
     returns_nothing,
     target_of,
@@ -446,10 +448,10 @@ def _result_of_nothing(crash: Crash) -> Clue | None:
 def _stored_as_another(case: Case) -> Clue | None:
     """A callback stores a value under a misspelled name, and the attribute that is read keeps its first value."""
     for source in case.sources.values():
-        if "getattr" in source.called or "setattr" in source.called:
+        if names_attributes_by_text(source):
             continue
         own = [dotted for dotted in source.stored if re.fullmatch(r"self\.\w+", dotted)]
-        read = {chain(n) for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load)}
+        read = attributes_read(source)
         late = {d: [n for n in source.stores(d) if source.function_name(n) != "__init__"] for d in own}
         never_late = [d.removeprefix("self.") for d in own if not late[d] and d in read]
         for dotted, places in late.items():

@@ -8,24 +8,24 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
+from grader.grading.judging.diagnosis.actions import CLIENT_CHECKS
 from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, is_told
-from grader.grading.judging.diagnosis.wiring import names_called, names_in
+from grader.grading.judging.diagnosis.wiring import attributes_read, names_attributes_by_text, names_called, names_in
 from grader.grading.judging.source import Source, chain, last_name
 
-_CLIENT_CHECKS = ("sends_goals", "after_goal", "cancels_goal")
 #: How programs call what they keep of the last time.
 _LAST = ("last", "prev", "old")
 
 
 def _sources(case: Case) -> Iterator[Source]:
     """Yield the files of a robot or of a client of an action, without those that set attributes by their names."""
-    if is_told(case) or case.criterion.check_name in _CLIENT_CHECKS:
-        yield from (s for s in case.sources.values() if not {"setattr", "getattr"} & {*s.called})
+    if is_told(case) or case.criterion.check_name in CLIENT_CHECKS:
+        yield from (s for s in case.sources.values() if not names_attributes_by_text(s))
 
 
 def _kept(source: Source) -> Iterator[tuple[str, list[ast.Assign], list[ast.Assign]]]:
     """Yield the attributes that `__init__` sets and something reads, with what sets them there, and elsewhere."""
-    read = {chain(n) for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load)}
+    read = attributes_read(source)
     for dotted in source.stored:
         if not dotted.startswith("self.") or dotted.count(".") > 1 or dotted not in read:
             continue

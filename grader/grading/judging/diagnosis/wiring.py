@@ -727,6 +727,16 @@ def is_read(source: Source, dotted: str) -> bool:
     return any(isinstance(n.ctx, ast.Load) and chain(n) == dotted for n in source.names())
 
 
+def attributes_read(source: Source) -> set[str]:
+    """Return the attributes whose values are used anywhere in the file, as `self.x`."""
+    return {chain(n) for n in source.all(ast.Attribute) if isinstance(n.ctx, ast.Load)}
+
+
+def names_attributes_by_text(source: Source) -> bool:
+    """Return whether the file reads or sets attributes by names that its text need not show."""
+    return "getattr" in source.called or "setattr" in source.called
+
+
 def time_since(source: Source, test: ast.expr) -> ast.BinOp | None:
     """Return `now - self.last` of a condition, also through a local variable; None if it compares no such time."""
     local = [v for n in ast.walk(test) if isinstance(n, ast.Name) and (v := sole_assignment(source, n)) is not None]
