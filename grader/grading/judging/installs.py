@@ -22,6 +22,7 @@ _MANIFEST: Mapping[str, tuple[str, str]] = {
     "empty": ("has an empty <{0}>", "write something into <{0}>"),
     "version": ("has the version {}", "write a version such as 0.1.0"),
     "email": ("has the e-mail address {}", "write a whole address, such as name@example.org"),
+    "no_email": ("has a maintainer without an e-mail address", "write a whole address, such as name@example.org"),
     "tag": ("has the tag <{}>, which its format does not know", "{advice}"),
     "twice": (
         "depends on {0} by <depend> and again by another tag",
@@ -56,7 +57,6 @@ def _manifest(names: Sequence[str]) -> tuple[str, str]:
     code, name = names
     what, hint = _MANIFEST.get(code, ("cannot be used", "compare it with one that `ros2 pkg create` makes"))
     advice = f"write <exec_depend> for <{name}>" if name == "run_depend" else 'remove it, or write format="3"'
-    what = "has a maintainer without an e-mail address" if (code, name) == ("email", "") else what
     return f"{what.format(name)}, {_NOT_ROS}", hint.format(name, advice=advice)
 
 

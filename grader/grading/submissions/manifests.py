@@ -30,7 +30,7 @@ def manifest_description(content: bytes) -> dict[str, Any]:
     """Return what a package.xml says: `problem`, a code and a name or null, `dependencies` and `build_types`.
 
     The codes are `xml`, with the line, `entities`, `root`, and, with a tag or text of the manifest, `format`, `number`,
-    `empty`, `version`, `email`, `tag`, `twice` and `itself`.
+    `empty`, `version`, `email`, `no_email`, `tag`, `twice` and `itself`.
     """
     root, problem = _root(content)
     if root is None:
@@ -89,7 +89,7 @@ def _problems(root: ET.Element) -> Iterator[tuple[str, str]]:
         yield "version", _text(root.find("version"))
     written = [one.get("email", "") for one in root.findall("maintainer")]
     written += [email for one in root.findall("author") if (email := one.get("email")) is not None]
-    yield from (("email", email) for email in written if not _EMAIL.fullmatch(email))
+    yield from (("email" if email else "no_email", email) for email in written if not _EMAIL.fullmatch(email))
     depends = list(_depends(root))
     whole = {text for tag, text in depends if tag == "depend"}
     yield from (("twice", text) for tag, text in depends if tag in _MEANT and text in whole)

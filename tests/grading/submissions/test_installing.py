@@ -130,6 +130,11 @@ WRONG: dict[str, tuple[FlawKind, Mapping[str, str | None], str]] = {
         {"package.xml": MANIFEST.replace("ada@example.org", "ada@laptop")},
         "my_robot/package.xml: has the e-mail address ada@laptop, so colcon does not build it as a ROS package",
     ),
+    "a maintainer without an address": (
+        FlawKind.MANIFEST,
+        {"package.xml": MANIFEST.replace(' email="ada@example.org"', "")},
+        "my_robot/package.xml: has a maintainer without an e-mail address, so colcon does not build it as a ROS package",
+    ),
     "no build type": (
         FlawKind.BUILD_TYPE,
         {"package.xml": MANIFEST.replace("<build_type>ament_python</build_type>", "")},
