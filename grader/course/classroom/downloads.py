@@ -32,7 +32,7 @@ from grader.grading.submissions.collected import (
     collisions,
     is_gradable,
     is_skipped,
-    leads_elsewhere,
+    may_be_left_out,
     name_problem,
     why_skipped,
 )
@@ -359,7 +359,7 @@ def _storable(inside: Sequence[tuple[str, Member]]) -> tuple[list[tuple[str, Mem
     reasons = []
     for name, member in inside:
         problem = name_problem(name)
-        if problem and member.kind == FILE and not leads_elsewhere(name) and not is_gradable(name):
+        if problem and member.kind == FILE and may_be_left_out(name):
             reasons.append(f"{printable(name, 200)}: {problem}, {why}")
         else:
             kept.append((name, member))

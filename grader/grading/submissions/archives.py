@@ -26,7 +26,7 @@ from grader.grading.submissions.collected import (
     generated_folders,
     is_gradable,
     is_skipped,
-    leads_elsewhere,
+    may_be_left_out,
     name_problem,
 )
 from grader.grading.submissions.foreign_archives import KINDS, UnpackerLimits, foreign_members, has_libarchive
@@ -359,7 +359,7 @@ def _wanted(members: Sequence[Member], left: LeftOut) -> Iterator[tuple[str, Mem
         if not name:  # the top folder itself
             continue
         problem = name_problem(name)
-        if problem and (leads_elsewhere(name) or is_gradable(name)):
+        if problem and not may_be_left_out(name):
             raise UnusableArchiveError(f"expected plain relative names, found {problem}: {printable(member.name)}")
         if member.kind == FOLDER or is_skipped(name):
             continue

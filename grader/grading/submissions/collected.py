@@ -151,9 +151,12 @@ def name_problem(path: str) -> str:
     return next((phrase for phrase, is_wrong in chain(*wrong) if is_wrong(path)), "")
 
 
-def leads_elsewhere(path: str) -> bool:
-    """Return whether the name of an archive member means another place to some program that unpacks it."""
-    return any(is_wrong(path) for is_wrong in _LEADING_ELSEWHERE.values())
+def may_be_left_out(path: str) -> bool:
+    """Return whether an archive member whose name is wrong may be left out: it is nothing that may be graded.
+
+    A name that means another place to some program that unpacks it refuses the archive, whatever the member is.
+    """
+    return not (any(is_wrong(path) for is_wrong in _LEADING_ELSEWHERE.values()) or is_gradable(path))
 
 
 def is_gradable(name: str) -> bool:
