@@ -263,9 +263,9 @@ def brakes_too_late(case: Case) -> Clue | None:
     if case.check.topic != "/truth/collisions":
         return None
     hits = [d.t_ns for d in case.trace.deliveries("/truth/collisions") if d.value["data"]]
-    told = [m.t_ns for m in case.trace.messages("/cmd_vel") if hits and m.t_ns < hits[0]]
-    stops = [m for m in case.trace.messages("/cmd_vel") if m.t_ns in told and not m.value["linear"]["x"]]
-    driven = [m for m in case.trace.messages("/cmd_vel") if m.t_ns in told and m.value["linear"]["x"] > 0]
+    told = [m for m in case.trace.messages("/cmd_vel") if hits and m.t_ns < hits[0]]
+    stops = [m for m in told if not m.value["linear"]["x"]]
+    driven = [m for m in told if m.value["linear"]["x"] > 0]
     clear = [d for d in case.trace.deliveries("/truth/clearance") if stops and d.t_ns <= stops[-1].t_ns]
     compared = [node for node, _, _ in comparisons(case)]
     if not (stops and driven and clear and compared) or stops[-1].t_ns < driven[-1].t_ns:
