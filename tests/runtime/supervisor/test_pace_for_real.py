@@ -159,12 +159,13 @@ def rate_hz(trace: AssessedTrace) -> float:
 @pytest.mark.long
 @pytest.mark.parametrize("name", but(("condition",), RELATIVE, NIGHTLY))
 def test_a_loop_that_pauses_after_its_work_is_as_slow_as_it_is(run: Record, name: str) -> None:
-    """20 ms of work and a pause of 50: 14 Hz, by the wall clock, or by the measured work if the machine is too busy.
+    """40 ms of work and a pause of 50: 11 Hz, by the wall clock, or by the measured work if the machine is too busy.
 
-    How long the same work takes depends on who else uses the processor. Only that it counts is known: 20 Hz without.
+    Of measured work at least half counts, which makes 14 Hz: with so much work, 16 also holds where it is done quicker
+    than when its length was measured.
     """
-    trace = run(RELATIVE[name])
-    assert rate_hz(trace) < 19
+    trace = run(RELATIVE[name], work=0.04)
+    assert rate_hz(trace) < 16
     assert trace.clock is ClockKind.VIRTUAL or trace.clock_reason in (DRIFTS, BUSY, OUTSIDE)
     assert trace.clock is ClockKind.WALL or CHARGED_NOTE in trace.notes
 
