@@ -222,12 +222,13 @@ class Discovery:
         services = any(c.kind in ("service", "client") for s in self._students for c in s.claims)
         services = services or bool(self._recorder.graph.services)
         nodes = self._nodes()
-        self._graph = self._observer.graph(now_ns, services=services, existing=nodes)
-        found = Counter((e.kind, e.topic, e.type) for e in self._graph.endpoints)
-        found.update(("node", name, "") for name in self._observer.students_nodes(nodes))
+        found = Counter(("node", name, "") for name in self._observer.students_nodes(nodes))
         for kind, name, _ in self._known:
             if kind in ("service", "client"):
                 found[kind, name, ""] = self._observer.ends_of(kind, name) - self._services.ends_of(kind, name)
+        # The graph after the counts: what they miss because it has just left is then not in the graph either.
+        self._graph = self._observer.graph(now_ns, services=services, existing=nodes)
+        found.update((e.kind, e.topic, e.type) for e in self._graph.endpoints)
         self._found = found
 
     def _nodes(self) -> set[str]:

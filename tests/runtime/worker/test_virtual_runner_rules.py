@@ -296,6 +296,48 @@ def test_the_others_see_that_a_process_has_left_before_time_goes_on(left: bool) 
     assert len(run.told("observer", Look)) < 20 * LOOKS
 
 
+@pytest.mark.rule(19)
+@pytest.mark.parametrize("looks_left", range(1, 7))
+def test_no_graph_is_recorded_from_before_a_process_left(looks_left: int) -> None:
+    """Whichever look is the first one after it has left: that at the names of nodes, at a service, or at the graph."""
+    ended = False
+
+    class Leaves(ScriptedObserver):
+        left = looks_left
+
+        def look(self) -> None:
+            if ended:
+                self.left -= 1
+                if not self.left:
+                    del self._world.claims["a.py"]
+
+        def graph(self, *args: Any, **kwargs: Any) -> GraphSnapshot:
+            self.look()
+            return super().graph(*args, **kwargs)
+
+        def students_nodes(self, *args: Any) -> list[str]:
+            self.look()
+            return super().students_nodes(*args)
+
+        def ends_of(self, *args: Any) -> int:
+            self.look()
+            return super().ends_of(*args)
+
+    def ends(me: ScriptedStudent, world: World) -> Program:
+        nonlocal ended
+        serves = claim("service", "/serve", "std_srvs/srv/Trigger")
+        yield from wait(100, endpoints=world.have(me.name, claim("node", "/a"), serves))
+        ended = True
+        yield {"kind": "exited", "code": 0, "left": True}
+
+    def stays(me: ScriptedStudent, world: World) -> Program:
+        yield from wait(200, endpoints=world.have(me.name, claim("node", "/b")))
+        yield idle()
+
+    graphs = Run(Leaves, ends, stays).trace.graphs()
+    assert {graph.t_ns // MS: graph.nodes for graph in graphs}[100] == ("/b",)
+
+
 # ------------------------------------------------------------------------------ all of them
 
 #: How a rule begins on its page.
