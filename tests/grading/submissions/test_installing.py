@@ -133,7 +133,8 @@ WRONG: dict[str, tuple[FlawKind, Mapping[str, str | None], str]] = {
     "a maintainer without an address": (
         FlawKind.MANIFEST,
         {"package.xml": MANIFEST.replace(' email="ada@example.org"', "")},
-        "my_robot/package.xml: has a maintainer without an e-mail address, so colcon does not build it as a ROS package",
+        "my_robot/package.xml: has a maintainer without an e-mail address, so colcon does not build it as a ROS "
+        "package",
     ),
     "no build type": (
         FlawKind.BUILD_TYPE,
