@@ -95,7 +95,7 @@ def test_rubrics_and_the_recording_travel_and_solutions_do_not(wheel: Path) -> N
     ):
         assert f"grader/shipped/rubrics/{needed}" in names
     assert "grader/grading/reporting/report.schema.json" in names
-    assert "grader/runtime/host/fastdds.xml" in names
+    assert "grader/runtime/host/machine/fastdds.xml" in names
     assert "grader/py.typed" in names
     assert "grader/shipped/student_template/velocity_publisher.py" in names
     assert not [name for name in names if "reference" in name or name.startswith(("tests/", "student_template/"))]

@@ -34,6 +34,8 @@ FEW_RESOURCES: Mapping[str, str] = {
 }
 
 
+#: The profile for quick discovery, which processes without the grader's code see as well.
+QUICK = "fastdds"
 #: What the names of profiles end with whose participants stay in the graph until somebody ends their lease.
 VIRTUAL = "_virtual"
 
@@ -51,9 +53,10 @@ def dds_profile(folder: str | Path, name: str, distro: str) -> dict[str, str]:
 def quick_discovery(host_folder: str | Path, runtime: PythonRuntime, clock: str = "") -> dict[str, str]:
     """Return the variable that makes Fast DDS repeat discovery quickly; the profile is in the host package.
 
-    On the virtual clock, the middleware does not end the lease of a process, which it would count in real time.
+    Without it, what Fast DDS 2.14 loses while two participants discover each other comes three seconds later. On the
+    virtual clock, the middleware does not end the lease of a process, which it would count in real time.
     """
-    name = f"fastdds{VIRTUAL if clock == ClockKind.VIRTUAL.value else ''}"
+    name = f"{QUICK}{VIRTUAL}" if clock == ClockKind.VIRTUAL.value else f"machine/{QUICK}"
     return dds_profile(host_folder, name, distro_of(runtime.environment))
 
 

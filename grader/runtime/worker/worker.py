@@ -33,7 +33,7 @@ from grader.runtime.patience import load_per_processor
 from grader.runtime.plan import Plan
 from grader.runtime.recording.codec import from_json, observation_to_json, trace_to_json
 from grader.runtime.ros_installation import MESSAGE_PACKAGES, PythonRuntime
-from grader.runtime.sandbox.environment import quick_discovery
+from grader.runtime.sandbox.environment import QUICK, dds_profile, distro_of, quick_discovery
 from grader.runtime.sandbox.protocol import Isolation, StudentProcess
 from grader.runtime.sandbox.start import die_with
 from grader.runtime.sandbox.starter import HASH_SEED, Starter
@@ -71,9 +71,9 @@ ADDRESS_SPACE_BYTES, SPARE_CPU_S = 4 * GIB, 5
 STEPPED_CPU_S = 600
 #: A worker that uses more memory after a scenario is replaced; ordinary scenarios leave 30 to 50 MiB.
 WORN_BYTES = 128 * MIB
-#: What a bare process sees of the grader: the module that makes the machine look the same.
+#: What a bare process sees of the grader: the module that makes the machine look the same, and how DDS discovers.
 MACHINE = Path(machine.__file__).resolve().parent
-#: Where it sees that module, which says nothing of the grader.
+#: Where it sees that folder, which says nothing of the grader.
 MACHINE_SEEN_AT = Path("/opt/student/lib")
 #: In sockstat: the TCP sockets in use, and those that only wait for their port to be free again (`tw`).
 _CONNECTIONS = re.compile(r"\bTCP6?: inuse (\d+)|\btw (\d+)")
@@ -428,7 +428,11 @@ class Worker:
             host_at=MACHINE_SEEN_AT,
             submission=Path(plan.root),
             arguments=(),
-            environment={"ROS_DOMAIN_ID": str(domain), "PYTHONPATH": os.pathsep.join(map(str, searched))},
+            environment={
+                "ROS_DOMAIN_ID": str(domain),
+                "PYTHONPATH": os.pathsep.join(map(str, searched)),
+                **dds_profile(own, QUICK, distro_of(self._runtime.environment)),
+            },
             pass_fds=(),
             installed=_installed(plan, name),
         )

@@ -466,6 +466,23 @@ def test_a_bare_process_sees_the_same_machine_and_no_way_to_the_grader(run: Call
     assert "grader_host" not in bare
 
 
+@pytest.mark.parametrize("plan", [{}, *more([{"clock": "wall"}]), {"clock": "wall", "bare": True}], ids=str)
+def test_every_process_of_a_student_discovers_others_quickly(run: Callable[..., AssessedTrace], plan: Any) -> None:
+    """Without the profile, one that starts after another one often hears nothing of it for three seconds."""
+    trace = run(
+        """
+        name = next(name for name in os.environ if name.endswith("_DEFAULT_PROFILES_FILE"))
+        with open(os.environ[name]) as profile:
+            print("initialAnnouncements" in profile.read())
+        rclpy.init()
+        rclpy.create_node("n")
+        """,
+        **plan,
+        duration_ns=ITS_END_NS,
+    )
+    assert trace.lines()[0].text == "True"
+
+
 @pytest.mark.parametrize("options", ["", *more(["signal_handler_options=rclpy.signals.SignalHandlerOptions.NO"])])
 def test_what_is_published_at_ctrl_c_counts(run: Callable[..., AssessedTrace], options: str) -> None:
     """A stop in a `finally` is sent where the context is still there; rclpy's own handler has shut it down by then."""
