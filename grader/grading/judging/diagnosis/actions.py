@@ -6,7 +6,7 @@ import ast
 import operator
 from collections.abc import Callable
 
-from grader.grading.judging.diagnosis.rules import Case, Clue, Crash, crash_rule, hint_rule
+from grader.grading.judging.diagnosis.rules import CLIENT_CHECKS, Case, Clue, Crash, crash_rule, hint_rule
 from grader.grading.judging.diagnosis.wiring import (
     conditions,
     constant_value,
@@ -44,8 +44,6 @@ from grader.grading.model.exercise import ProblemKind
 from grader.grading.model.wording import nearest, number, quote
 from grader.runtime.model.quantities import seconds
 
-#: The checks of a client, by their names in rubrics.
-CLIENT_CHECKS = ("sends_goals", "after_goal", "cancels_goal")
 #: What sends a goal, at once or in time.
 _SENDS = ("send_goal_async", "send_goal")
 _WAITS = ("wait_for_server", "server_is_ready")

@@ -8,8 +8,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from grader.grading.judging.diagnosis.actions import CLIENT_CHECKS
-from grader.grading.judging.diagnosis.rules import Case, Clue, hint_rule, is_told
+from grader.grading.judging.diagnosis.rules import CLIENT_CHECKS, Case, Clue, hint_rule, is_told
 from grader.grading.judging.diagnosis.wiring import attributes_read, names_attributes_by_text, names_called, names_in
 from grader.grading.judging.source import Source, chain, last_name
 

@@ -25,6 +25,8 @@ _FRAME = re.compile(r"(?P<file>.*):(?P<line>\d+) in (?P<name>\S+)$")
 #: Stands for a missing file; nothing is found in it.
 NO_SOURCE = Source("")
 _ANYTHING = re.compile("")
+#: The checks of a client of an action, by their names in rubrics.
+CLIENT_CHECKS = ("sends_goals", "after_goal", "cancels_goal")
 #: The place of a rule of a rubric's own, unless it says another: before all rules of the grader, which begin at 1000.
 FIRST = 100
 #: Largest relative difference of two rates or periods that are taken for the same.
