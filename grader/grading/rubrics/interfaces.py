@@ -211,7 +211,8 @@ class Interfaces:
             return where.mistake(f"expected an installed package, found `{package}`", hint)
         known = [name for name in self.of_kind(kind) if name.startswith(f"{package}/")]
         hint = nearest_hint(type_, known) or (f"{package} has {listed([name.rpartition('/')[2] for name in known])}")
-        return where.mistake(f"expected a {_KINDS[kind]} type of {package}, found `{printable(type_)}`", hint)
+        article = "an" if kind == "action" else "a"
+        return where.mistake(f"expected {article} {_KINDS[kind]} type of {package}, found `{printable(type_)}`", hint)
 
     def at_path(self, type_: str, path: str) -> Field | str:
         """Return the field at a path of a type, or the element of a list; a text with what is wrong if there is none.
@@ -467,8 +468,11 @@ def _paths(part: object, path: TreePath) -> Iterator[tuple[TreePath, FieldOf, ob
         if mark is not None:
             yield place, mark, value
         elif isinstance(value, tuple):
+            mark = next(filter(None, map(_mark, get_args(hints[field.name]))), None)
             for index, item in enumerate(value):
-                if is_dataclass(item):
+                if mark is not None:
+                    yield (*place, index), mark, item
+                elif is_dataclass(item):
                     yield from _paths(item, (*place, index))
 
 

@@ -23,7 +23,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from grader.grading.judging.series import FormulaError, curve
-from grader.grading.rubrics.units import QuantityError, missing_unit, parse_quantity, quantity_example, quantity_pattern
+from grader.grading.rubrics.units import QuantityError, parse_quantity, quantity_example, quantity_pattern
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.limits import MAX_BAG_BYTES
 from grader.runtime.model.quantities import Unit, size
@@ -121,9 +121,8 @@ class Quantity(GroupedMetadata):
 
     def _read(self, value: object) -> int | float:
         try:
-            if isinstance(value, (int, float)) and not isinstance(value, bool):
-                raise missing_unit(str(value), self.unit.symbol)
-            quantity = parse_quantity(value if isinstance(value, str) else "", self.unit)
+            is_text = isinstance(value, (int, float, str)) and not isinstance(value, bool)
+            quantity = parse_quantity(str(value) if is_text else "", self.unit)
         except QuantityError as error:
             raise wrong(error.expected, error.hint) from None
         if self.above_zero and not quantity > 0:

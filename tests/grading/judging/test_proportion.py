@@ -198,7 +198,7 @@ def test_which_checks_measure() -> None:
         "silence": ("number of messages", "", "less"),
         "field_in_range": ("distance from the range", "", "less"),
         "cancels_goal": ("time to the request to cancel", "s", "less"),
-        "after_goal": ("time to the next goal", "s", "less"),
+        "after_goal": ("time to the right goal", "s", "less"),
         "reaches_goal": ("time to a goal", "s", "less"),
         "stays_in_range": ("distance from the range", "", "less"),
     }

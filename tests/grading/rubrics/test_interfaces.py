@@ -81,6 +81,11 @@ criteria:
         cases:
           - when: {range_max: 12}
             formulas: {angular.z: "2 - ranges[1] * range_min"}
+  - id: asks
+    title: Asks
+    points: 5
+    scenario: alone
+    check: {sends_goals: {action: /count, goals: [{order: 3}, {order: 4}], every: {order: {low: 1}}}}
 """
 
 #: What an author may write by mistake: old text, new text, line and column, what was expected, and the hint.
@@ -106,6 +111,9 @@ MISTAKES = [
     ("field: data", "field: dta", "53:52", "a field of an installed message type", "`data`?"),
     ("{angular.z: ", "{angular.w: ", "64:24", "a field of geometry_msgs/msg/Vector3", ""),
     ("* range_min", "* range_mim", "64:35", "a field of sensor_msgs/msg/LaserScan", "`range_min`?"),
+    ("test_msgs/action/Fibonacci", "test_msgs/action/Fibonaci", "18:38", "an action type of test_msgs", "Fibonacci`?"),
+    ("{order: 4}", "{oder: 4}", "69:64", "a field of test_msgs/action/Fibonacci_Goal (`order`)", "`order`?"),
+    ("every: {order", "every: {oder", "69:84", "a field of test_msgs/action/Fibonacci_Goal (`order`)", "`order`?"),
     ("* range_min", "* range_min[0]", "64:35", "no field below `range_min`, which is a number", ""),
 ]
 

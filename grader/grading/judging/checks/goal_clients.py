@@ -76,7 +76,8 @@ def sent_goals(trace: Trace, action: str) -> tuple[SentGoal, ...]:
             end, end_ns = status_of(result.response), result.response.t_ns
         # Without an id, a request to cancel is about all goals that run.
         mine = (c.request for c in cancels if goal_id(c.request.value, "goal_info.goal_id") in (uuid, _EVERY))
-        asked = tuple(r.t_ns for r in mine if call.request.t_ns <= r.t_ns)
+        # One that comes when the goal has ended is about other goals, or about none.
+        asked = tuple(r.t_ns for r in mine if call.request.t_ns <= r.t_ns <= end_ns)
         found.append(SentGoal(call, end, end_ns, asked))
     return tuple(found)
 
@@ -247,8 +248,8 @@ class CancelsGoal:
 _SAID = {"same": "the same goal again", "next": "another goal", "goal": "a goal", "nothing": "no goal"}
 
 
-def _was(end: str) -> str:
-    return end if end == "succeeded" else f"was {end}"
+def _was(end: str, count: int = 1) -> str:
+    return end if end == "succeeded" else f"{'was' if count == 1 else 'were'} {end}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,12 +262,12 @@ class AfterGoal:
         action: Action name as on the wire.
         end: How the goal ends: `succeeded`, `rejected`, `aborted` or `canceled`.
         then: What comes next: `same` sends the same goal again, `next` another one, `goal` any, and `nothing` none.
-        within: Longest time to the next goal; for `nothing`, how long none may come.
+        within: Longest time to the right goal; for `nothing`, how long none may come.
         at_least: Number of goals that have to end so.
         first: How many of them are judged, from the first one on; all if left out.
     """
 
-    measures: ClassVar[Measure] = Measure("time to the next goal", "s")
+    measures: ClassVar[Measure] = Measure("time to the right goal", "s")
     action: str
     end: End
     then: Literal["same", "next", "goal", "nothing"] = "goal"
@@ -289,17 +290,17 @@ class AfterGoal:
         judged = [(k, g) for k, g in ended if follow[k] is not None or g.end_ns + late_ns < trace.stop_ns]
         evidence: dict[str, object] = {"goals": len(goals), "ends": [g.end for g in goals[:20]], "judged": len(judged)}
         if len(judged) < self.at_least or not judged:
-            what = f"{self.action}: {counted(len(judged), 'goal')} {_was(self.end)} in time"
+            what = f"{self.action}: {counted(len(judged), 'goal')} {_was(self.end, len(judged))} in time"
             return _too_few(trace, what, self.at_least, evidence)
-        took = [] if self.then == "nothing" else [Reading(g.end_ns, _took_s(g, follow[k])) for k, g in judged]
+        took = [] if self.then == "nothing" else [Reading(g.end_ns, self._took_s(g, follow[k])) for k, g in judged]
         for k, goal in judged:
             flaw = self._flaw(goal, follow[k], late_ns)
             if flaw:
                 reason = f"{moment(goal.end_ns)}, {self.action}: goal {k + 1} {_was(self.end)}, then {flaw}"
                 found = not_met(f"{reason}; expected {self.expected}", evidence, measured=took)
                 return _unless_crashed(trace, found, evidence)
-        reason = f"{self.action}: {_SAID[self.then]} after {counted(len(judged), 'goal')} that {_was(self.end)}"
-        return met(reason, evidence, measured=took)
+        ends = f"{counted(len(judged), 'goal')} that {_was(self.end, len(judged))}"
+        return met(f"{self.action}: {_SAID[self.then]} after {ends}", evidence, measured=took)
 
     def _flaw(self, goal: SentGoal, after: SentGoal | None, late_ns: int) -> str:
         """Describe what is wrong with what follows a goal; empty if nothing is."""
@@ -310,14 +311,19 @@ class AfterGoal:
             return "no goal was sent"
         if not soon:
             return f"the next one was sent only after {seconds(after.t_ns - goal.end_ns):.3f} s"
-        same = after.content == goal.content
-        if self.then == "same" and not same:
-            return f"another one was sent: {quote(str(dict(after.content)))}"
-        return "the same one was sent again" if self.then == "next" and same else ""
+        if self._fits(goal, after):
+            return ""
+        if self.then == "next":
+            return "the same one was sent again"
+        return f"another one was sent: {quote(str(dict(after.content)))}"
 
+    def _fits(self, goal: SentGoal, after: SentGoal) -> bool:
+        """Return whether the goal after another is the one expected."""
+        return self.then == "goal" or (after.content == goal.content) == (self.then == "same")
 
-def _took_s(goal: SentGoal, after: SentGoal | None) -> float:
-    return math.inf if after is None else seconds(after.t_ns - goal.end_ns)
+    def _took_s(self, goal: SentGoal, after: SentGoal | None) -> float:
+        """Return the time to the goal that is expected; infinite if it never came, or another one did."""
+        return math.inf if after is None or not self._fits(goal, after) else seconds(after.t_ns - goal.end_ns)
 
 
 def _too_few(trace: Trace, what: str, at_least: int, evidence: dict[str, object]) -> Finding:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -85,6 +86,30 @@ def test_a_goal_may_be_cancelled_after_a_time() -> None:
     assert [reading.value for reading in check.judge(recording.trace()).readings] == [0.25]
     ended = client().goal(1, 1, 5).result(2, 1, "succeeded")
     assert "0 goals came to the moment to cancel, expected at least 1" in found(check, ended)[1]
+
+
+def test_a_request_to_cancel_is_about_goals_that_run() -> None:
+    """One without an id is about all of them, and none is about a goal that has ended."""
+    recording = client().goal(1, 1, 5).result(2, 1, "succeeded").goal(2, 2, 6).feedback(4, 2, 3).cancel(4, 0)
+    recording.result(4, 2, "canceled").cancel(5, 1)
+    assert [g.cancels_ns for g in sent_goals(recording.trace(), ACTION)] == [(), (4 * NS_PER_S,)]
+    assert found(CancelsGoal(ACTION, {"sequence[0]": 3}), recording) == (1, "/count: 1 goal cancelled in time")
+
+
+@pytest.mark.parametrize(("then", "numbers"), [("same", [math.inf]), ("next", [0.5]), ("goal", [0.5])])
+def test_only_the_expected_goal_takes_a_time(then: Any, numbers: list[float]) -> None:
+    """With another one, what is measured never came."""
+    recording = client().goal(2, 1, 5, accepted=False).goal(2.5, 2, 6)
+    finding = AfterGoal(ACTION, "rejected", then).judge(recording.trace())
+    assert [reading.value for reading in finding.readings] == numbers
+
+
+def test_too_few_ends_are_told_in_the_plural() -> None:
+    """None was, and several were."""
+    recording = client().goal(1, 1, 5).result(2, 1, "succeeded")
+    assert "0 goals were aborted in time" in found(AfterGoal(ACTION, "aborted"), recording)[1]
+    recording = client().goal(1, 1, 5, accepted=False).goal(2, 2, 5, accepted=False).goal(3, 3, 5)
+    assert "after 2 goals that were rejected" in found(AfterGoal(ACTION, "rejected"), recording)[1]
 
 
 @pytest.mark.parametrize(
