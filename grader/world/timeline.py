@@ -61,6 +61,7 @@ class Timeline:
         self._participants: list[Participant] = []
         self._answers: dict[str, Callable[[Mapping[str, Any]], Any]] = {}
         self._starting = self._judging = False
+        self._shown = 0  # how many observations since the last command somebody who answers has seen already
         self.run = SteppedRun(session.begin(plan), self._answered)
 
     def join(self, participant: Participant, **answers: Callable[[Mapping[str, Any]], Any]) -> None:
@@ -73,7 +74,8 @@ class Timeline:
         self._participants.append(participant)
         self._answers |= answers
 
-    def _answered(self, question: Mapping[str, Any]) -> Any:
+    def _answered(self, question: Mapping[str, Any], observations: Sequence[Observation]) -> Any:
+        self._show(observations)
         return self._answers[question["ask"]](question)
 
     @property
@@ -105,9 +107,15 @@ class Timeline:
         return told
 
     def _tell(self, command: Command | None, told: Mapping[str, Any], observations: Sequence[Observation]) -> None:
-        self._observed.add(observations)
+        self._show(observations)
+        self._shown = 0
         for participant in self._participants:
             participant.note(command, told, observations)
+
+    def _show(self, observations: Sequence[Observation]) -> None:
+        """Let the test see what was observed since the last command."""
+        self._observed.add(observations[self._shown :])
+        self._shown = len(observations)
 
     def catch_up(self) -> None:
         """Learn what has happened since the last command, before the test looks or time passes.

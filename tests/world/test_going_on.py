@@ -1,6 +1,6 @@
 """What goes on while a test lets time pass: calls, goals, restarts, recordings; with real nodes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,18 @@ def answer(request, response):
     return response
 
 node.create_service(Trigger, "/slow", answer)
+"""
+TICKING = """
+counts = node.create_publisher(Int32, "/count", 10)
+looks, slowly = node.create_client(Trigger, "/look"), ActionClient(node, Fibonacci, "/slowly")
+
+def tick():
+    counts.publish(Int32())
+    looks.call_async(Trigger.Request())
+    slowly.send_goal_async(Fibonacci.Goal())
+
+node.create_timer(1.0, tick)
+rclpy.spin(node)
 """
 COUNTING = """
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -241,6 +253,31 @@ def test_an_action_is_served_by_a_function(ros: World, write: Write) -> None:
     begun = [(5.0, "heard [0]"), (5.0, "accepted True"), (5.5, "heard [1]")]
     then = said(asking)[len(first) + 1 + len(third) :]
     assert (then[:3], sorted(then[3:])) == (begun, cancelled)
+
+
+def test_who_answers_sees_what_has_happened_by_then(ros: World, write: Write) -> None:
+    """The functions of a service and of an action are called in the middle of a step, and look at that moment."""
+    seen: list[tuple[float, int]] = []
+
+    def look() -> None:
+        seen.append((ros.now, len(ros.messages("/count"))))
+
+    def trigger(request: Trigger.Request) -> Trigger.Response:
+        del request
+        look()
+        return Trigger.Response()
+
+    def slowly(goal: Fibonacci.Goal) -> Iterator[float]:
+        del goal
+        yield 0.5
+        look()
+
+    ros.serve("/look", Trigger, trigger)
+    ros.serve_action("/slowly", Fibonacci, slowly)
+    ros.run(write(TICKING))
+    ros.advance(3.1)
+    assert seen == [(1.0, 1), (1.5, 1), (2.0, 2), (2.5, 2), (3.0, 3)]
+    assert [one.t for one in ros.received("/count")] == [1.0, 2.0, 3.0]
 
 
 def test_an_action_is_served_by_a_list_of_steps(ros: World, write: Write) -> None:

@@ -143,19 +143,25 @@ def test_time_does_not_go_back() -> None:
 
 def test_who_answers_for_the_test_lets_no_time_pass() -> None:
     """The worker asks in the middle of a command, and waits."""
-    worker = ScriptedWorker({"ask": "service", "service": "/s"}, IDLE)
-    timeline, _, _ = opened(worker)
+    question = {"ask": "service", "service": "/s", "now_ns": 4, "news": [line(4, "a")]}
+    worker = ScriptedWorker(question, {**IDLE, "now_ns": 5, "news": [line(5, "b")]})
+    timeline, observed, _ = opened(worker)
     told: list[Said] = []
+    seen: list[tuple[int, int]] = []
 
     def answer(question: Said) -> None:
         told.append(question)
         timeline.catch_up()  # looking is allowed
+        seen.append((timeline.now_ns, len(observed.everything)))
         timeline.perform(Advance(5))
 
     timeline.join(Listener("only", []), service=answer)
     with pytest.raises(RuntimeError, match="cannot let time pass"):
         timeline.perform(Advance(1))
-    assert told == [{"ask": "service", "service": "/s"}]
+    assert told == [question]
+    assert seen == [(4, 1)]
+    assert timeline.perform(Advance(6)) == IDLE
+    assert [one.t_ns for one in observed.everything] == [4, 5]
 
 
 @pytest.mark.parametrize(("script", "usable"), [([], True), ([WorkerLostError("it has ended")], False)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
@@ -14,7 +14,7 @@ from grader.runtime.steps import Command, Finish, LaunchFailedError
 from grader.runtime.supervisor.supervisor import TRIES, Recorder, WorkerLostError
 
 #: Answers a question of the worker, while virtual time stands still.
-Answer = Callable[[Mapping[str, Any]], Any]
+Answer = Callable[[Mapping[str, Any], Sequence[Observation]], Any]
 
 
 class SteppedWorker(Protocol):
@@ -61,7 +61,8 @@ class SteppedRun:
 
     Args:
         lent: The worker, which has begun the run.
-        answer: Answers questions of the worker. What it raises is raised by the command that led to the question.
+        answer: Answers questions of the worker; gets what was observed since the last command, too. What it raises is
+            raised by the command that led to the question.
 
     Attributes:
         now_ns: Virtual time since the run began.
@@ -113,15 +114,13 @@ class SteppedRun:
             raise
         finally:
             self._busy = False
-        observations = self._adopt(told)
+        self._observations += self._adopt(told)
         if self._raised is not None:
             raised, self._raised = self._raised, None
-            self._observations = observations
             raise raised
-        observations, self._observations = [*self._observations, *observations], []
         if told.get("problem"):
-            self._observations = observations
             raise (LaunchFailedError if told.get("launch_failed") else HarnessError)(told["problem"])
+        observations, self._observations = self._observations, []
         return told, observations
 
     def close(self) -> list[Observation]:
@@ -139,10 +138,11 @@ class SteppedRun:
         return observations
 
     def _answered(self, question: Mapping[str, Any]) -> Any:
+        self._observations += self._adopt(question)
         if self._raised is not None:
             return None  # the first error is raised at the end of the command
         try:
-            return self._answer(question)
+            return self._answer(question, self._observations)
         except Exception as error:
             self._raised = error
             return None
@@ -150,8 +150,8 @@ class SteppedRun:
     def _adopt(self, told: Mapping[str, Any]) -> list[Observation]:
         from grader.runtime.recording.packed import observations_from_json  # noqa: PLC0415 - as in the supervisor
 
-        self.now_ns, self.full = told["now_ns"], told["full"]
-        self.ended = dict(told["ended"])
+        self.now_ns, self.full = told["now_ns"], told.get("full", self.full)
+        self.ended = dict(told.get("ended", self.ended))
         return observations_from_json(told["news"])
 
     def _give_up(self) -> None:

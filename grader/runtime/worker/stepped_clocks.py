@@ -154,7 +154,7 @@ class VirtualSteppedRunner(SteppedRunner, VirtualRunner):
         """
 
         def is_enough() -> bool:
-            return until_news and bool(self._recorder.observations)
+            return until_news and self._has_news()
 
         self._core.go_to(to_ns)
         self._carry_out(self._core.run_on(is_enough))
@@ -212,7 +212,7 @@ class WallSteppedRunner(SteppedRunner, WallRunner):
         self._pause()
 
     def _advance(self, to_ns: int, *, until_news: bool = False) -> None:
-        self._await(lambda: until_news and bool(self._recorder.observations), to_ns)
+        self._await(lambda: until_news and self._has_news(), to_ns)
 
     def _await(self, condition: Callable[[], bool], until_ns: int) -> None:
         """Record what happens until a condition holds, or until a moment; it is looked at once at least."""

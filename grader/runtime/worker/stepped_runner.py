@@ -123,6 +123,7 @@ class SteppedRunner(Runner):
         self._offered: dict[str, PlannedMessages] = {}
         self._served: set[str] = set()
         self._faults: list[Fault] = []
+        self._is_news = False  # whether the command that is carried out has led to something observed
 
     @property
     def now_ns(self) -> int:
@@ -135,6 +136,7 @@ class SteppedRunner(Runner):
         Raises:
             HarnessError: A type or a field is not known on this machine.
         """
+        self._is_news = False
         match command:
             case Advance():
                 self._advance(command.to_ns, until_news=command.until_news)
@@ -165,7 +167,12 @@ class SteppedRunner(Runner):
         found = self._recorder.observations
         self._faults += [o for o in found if isinstance(o, Fault)]
         self._recorder.observations = []
+        self._is_news = self._is_news or bool(found)
         return found
+
+    def _has_news(self) -> bool:
+        """Return whether something was observed in this command, even if it was told with a question already."""
+        return self._is_news or bool(self._recorder.observations)
 
     def programs(self) -> dict[str, int | None]:
         """Return the exit code of each process that has ended."""

@@ -155,13 +155,19 @@ class Worker:
                 _await_ready(student)
                 yield student, dict(added.starts_ns).get(name, 0)
 
+        def packed_news() -> list[list[Any]]:
+            return [_compact(o) if plan.working else _whole(o) for o in runner.news()]
+
+        def ask(question: Mapping[str, Any]) -> Any:
+            return other.ask({**question, "news": packed_news()})  # whoever answers may look at what has happened
+
         sys.path += [folder for folder in plan.interfaces if folder not in sys.path]
         with ExitStack() as processes, ExitStack() as began:
             limit_processor_time(STEPPED_CPU_S)
             observer = Observer(domain, plan.limits)
             began.callback(observer.close)
             began.enter_context(self._monitor(students, plan, own_s=STEPPED_CPU_S))
-            runner = STEPPED[plan.clock](plan, students, observer, start, other.ask)
+            runner = STEPPED[plan.clock](plan, students, observer, start, ask)
             is_real = plan.clock == ClockKind.WALL.value
             if is_real:
                 late_numpy.load_numpy()
@@ -178,8 +184,8 @@ class Worker:
                     answer = runner.perform(command)
                 except HarnessError as error:
                     answer = {"problem": error.message, "launch_failed": isinstance(error, LaunchFailedError)}
-                news = [_compact(o) if plan.working else _whole(o) for o in runner.news()]
-                common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full(), "news": news}
+                common = {"now_ns": runner.now_ns, "ended": runner.programs(), "full": runner.full()}
+                common["news"] = packed_news()
                 common["begun"] = runner.begun()
                 is_last = isinstance(command, Finish)
                 last = {"notes": runner.notes(), "unsuitable": runner.unsuitable()} if is_last else {}
