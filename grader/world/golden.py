@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from grader.grading.model.wording import moment, quote
+from grader.grading.model.wording import moment, nearest, quote
 from grader.world.errors import RecordingDiffers
 
 #: What a difference shows of a value, in characters.
@@ -32,14 +33,26 @@ def kept_lines(messages: Sequence[KeptMessage]) -> str:
 def read_kept(path: Path) -> list[KeptMessage]:
     """Read a recording; raises ValueError with file and line if it is not one."""
     found: list[KeptMessage] = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-        try:
-            found.append(KeptMessage(**json.loads(line)))
-        except (TypeError, ValueError) as error:
-            raise ValueError(
-                f"{path}:{number}: expected a message of a kept recording, found {quote(line, 40)}"
-            ) from error
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        one = _kept_message(line)
+        if one is None:
+            shown = quote(line, 40) or "an empty line"
+            text = f"{path}:{number}: expected a message of a kept recording, found {shown}"
+            raise ValueError(f"{text}; pytest --ros-update writes the file anew")
+        found.append(one)
     return found
+
+
+def _kept_message(line: str) -> KeptMessage | None:
+    """Return the message in a line; None if it holds none."""
+    try:
+        fields = json.loads(line)
+    except ValueError:
+        return None
+    kinds = {"t_ns": int, "topic": str, "type": str, "message": dict}
+    if not isinstance(fields, dict) or {name: type(value) for name, value in fields.items()} != kinds:
+        return None
+    return KeptMessage(**fields)
 
 
 def write_kept(path: Path, messages: Sequence[KeptMessage]) -> None:
@@ -55,7 +68,11 @@ def compare_with_kept(
     tolerance: float | Mapping[str, float],
     late_ns: int | None,
 ) -> None:
-    """Compare messages with a recording; raises RecordingDiffers if they differ, or if there is none.
+    """Compare messages with a recording.
+
+    Raises:
+        RecordingDiffers: They differ, or there is no such recording.
+        ValueError: The file is no recording, or a tolerance is none.
 
     Args:
         path: The recording.
@@ -68,9 +85,22 @@ def compare_with_kept(
     if not path.is_file():
         raise RecordingDiffers(f"{path}: expected a recording, found none; pytest --ros-update writes it")
     kept = [one for one in read_kept(path) if not topics or one.topic in topics]
-    by_topic = tolerance if isinstance(tolerance, Mapping) else {one.topic: tolerance for one in (*kept, *now)}
+    known = sorted({*topics, *(one.topic for one in (*kept, *now))})
+    by_topic = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(known, tolerance)
+    for name, allowed in by_topic.items():
+        if name not in known:
+            close = nearest(name, known)
+            meant = f"; did you mean {close}?" if close else ""
+            raise ValueError(f"tolerance: expected a topic of the recording, found {name}{meant}")
+        refuse_no_tolerance("tolerance", allowed)
     if differs := difference_from_kept(kept, now, by_topic, late_ns):
         raise RecordingDiffers(f"{differs}; recorded in {path}, which pytest --ros-update renews")
+
+
+def refuse_no_tolerance(what: str, value: Any) -> None:
+    """Raise ValueError for what numbers cannot differ by."""
+    if not isinstance(value, Real) or not value >= 0:
+        raise ValueError(f"{what}: expected a number of at least 0, found {value!r}")
 
 
 def difference_from_kept(
@@ -91,13 +121,20 @@ def difference_from_kept(
             if one.type != other.type:
                 return f"{place}: expected {one.type}, found {other.type}"
             if late_ns is not None and abs(one.t_ns - other.t_ns) > late_ns:
-                return f"{place}: expected at {moment(one.t_ns)}, found at {moment(other.t_ns)}"
+                expected_at, found_at = _moments(one.t_ns, other.t_ns)
+                return f"{place}: expected at {expected_at}, found at {found_at}"
             for field, wanted, got in _differences(one.message, other.message, tolerance.get(topic, 0.0), ""):
                 what = f" of {field}" if field else ""
                 return f"{place} ({moment(other.t_ns)}): expected{what} {_shown(wanted)}, found {_shown(got)}"
         if len(expected) != len(found):
             return f"{topic}: expected {len(expected)} messages, found {len(found)}"
     return ""
+
+
+def _moments(one_ns: int, other_ns: int) -> tuple[str, str]:
+    """Return two times that differ so that one sees that they do."""
+    shown = moment(one_ns), moment(other_ns)
+    return shown if shown[0] != shown[1] else (f"t = {one_ns:,} ns", f"t = {other_ns:,} ns")
 
 
 def _differences(kept: Any, now: Any, tolerance: float, place: str) -> Iterator[tuple[str, Any, Any]]:

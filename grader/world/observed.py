@@ -74,6 +74,11 @@ class Observed:
             for one in self._messages.get(topic, ())
         ]
 
+    def had_publisher(self, topic: str) -> bool:
+        """Return whether a program has published on a topic, or had a publisher on it."""
+        graphs = (one for one in self.everything if isinstance(one, GraphSnapshot))
+        return topic in self._messages or any(graph.ends_of_topics("publisher", topic) for graph in graphs)
+
     def rate(self, topic: str, since_ns: int) -> float:
         """Return how many messages a second programs have published on a topic since a time; 0 for fewer than two."""
         times = [one.t_ns for one in self._messages.get(topic, ()) if one.t_ns >= since_ns]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import field
@@ -12,6 +13,7 @@ from random import Random
 from typing import Any, ParamSpec, TypeVar
 
 from grader.grading.model.tested_run import SideOfTest
+from grader.grading.model.wording import moment
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import GraderError
 from grader.runtime.model.quantities import NS_PER_S, seconds
@@ -35,7 +37,7 @@ from grader.world.calling import Calls
 from grader.world.calls import CallLog, noted_call
 from grader.world.errors import NoMessage, ParameterRejected, StepTimeout
 from grader.world.frames import TRANSFORMS, FrameTransform, last_links, transform_between
-from grader.world.golden import compare_with_kept, write_kept
+from grader.world.golden import compare_with_kept, refuse_no_tolerance, write_kept
 from grader.world.names import absolute_name
 from grader.world.observed import Observed
 from grader.world.offering import Offers, length_of, publication, recorded_publications
@@ -585,6 +587,8 @@ class World:
 
         Raises:
             RecordingDiffers: It differs, or there is no such recording.
+            NoMessage: No program has published on one of the topics, or on any.
+            ValueError: The file has another ending or is no recording, or a tolerance is none.
         """
         __tracebackhide__ = True
         if not self._near:
@@ -592,13 +596,21 @@ class World:
         self._timeline.catch_up()
         names = [*map(absolute_name, topics)]
         path, now = self._near[0] / file, self._observed.kept_messages(names)
+        if path.suffix != ".jsonl":
+            raise ValueError(f"{file}: expected a name that ends with .jsonl: pytest --ros-update writes to this file")
+        if unknown := [name for name in names if not self._observed.had_publisher(name)]:
+            raise self._account.silence(unknown[0])
+        if not names and not now:
+            raise NoMessage(f"{file}: no program has published anything by {moment(self._timeline.now_ns)}")
         if self.updates_recordings:
             write_kept(path, now)
             return
         allowed: float | Mapping[str, float] = tolerance
         if isinstance(tolerance, Mapping):
             allowed = {absolute_name(name): value for name, value in tolerance.items()}
-        late_ns = None if self._timeline.is_real else round(time_tolerance * NS_PER_S)
+        refuse_no_tolerance("time_tolerance", time_tolerance)
+        any_time = self._timeline.is_real or math.isinf(time_tolerance)
+        late_ns = None if any_time else round(time_tolerance * NS_PER_S)
         compare_with_kept(path, now, names, allowed, late_ns)
 
     @noted_call

@@ -1,12 +1,15 @@
 """Kept recordings of a test: what differs is named, within tolerances; an option writes them."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.world.golden import KeptMessage, difference_from_kept, kept_lines, read_kept
+from grader.world.errors import NoMessage
+from grader.world.golden import KeptMessage, compare_with_kept, difference_from_kept, kept_lines, read_kept
+from grader.world.world import World
 
 S = 1_000_000_000
 
@@ -39,7 +42,7 @@ def test_a_recording_is_read_as_it_was_written(values: list[object], tmp_path_fa
         (kept(1.0, "2"), '/x, message 2 (t = 2.000 s): expected of a[0].b 2.0, found "2"'),
         (kept(1.0, True), "/x, message 2 (t = 2.000 s): expected of a[0].b 2.0, found true"),
         (kept(1.0), "/x: expected 2 messages, found 1"),
-        (kept(1.0, 2.0, t_ns=S + 1), "/x, message 1: expected at t = 1.000 s, found at t = 1.000 s"),
+        (kept(1.0, 2.0, t_ns=S + 1), "/x, message 1: expected at t = 1,000,000,000 ns, found at t = 1,000,000,001 ns"),
         (kept(1.0, 2.0, topic="/y"), "/x: expected 2 messages, found 0"),
     ],
 )
@@ -50,10 +53,46 @@ def test_the_first_difference_is_named(now: list[KeptMessage], says: str) -> Non
 
 def test_a_file_that_is_no_recording_is_named_with_its_line(tmp_path: Path) -> None:
     """A line of JSON that is no message, and one that is no JSON."""
-    for line in ("[1]", "{", '{"a": 1}'):
-        (tmp_path / "a.jsonl").write_text(kept_lines(kept(1)) + line, encoding="utf-8")
-        with pytest.raises(ValueError, match=r"a\.jsonl:2: expected a message of a kept recording, found"):
+    message = '{"t_ns": "1", "topic": "/x", "type": "a/msg/B", "message": {}}'
+    for line in ("[1]", "{", '{"a": 1}', message, message.replace('"1"', "true"), "\xff", "<<<<<<< HEAD", " "):
+        (tmp_path / "a.jsonl").write_bytes((kept_lines(kept(1)) + line).encode("latin-1"))
+        with pytest.raises(
+            ValueError, match=r"a\.jsonl:2: expected a message of a kept recording, found .*--ros-upd"
+        ) as told:
             read_kept(tmp_path / "a.jsonl")
+        assert told.value.__context__ is None  # no traceback of a parser
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "says"),
+    [
+        (-1.0, "tolerance: expected a number of at least 0, found -1.0"),
+        (float("nan"), "tolerance: expected a number of at least 0, found nan"),
+        ("0.1", "tolerance: expected a number of at least 0, found '0.1'"),
+        ({"/ocunt": 0.1}, r"tolerance: expected a topic of the recording, found /ocunt; did you mean /count\?"),
+    ],
+)
+def test_what_is_no_tolerance_is_refused(tmp_path: Path, tolerance: Any, says: str) -> None:
+    """Also where nothing differs: it would hide what differs later, or nothing at all."""
+    (tmp_path / "a.jsonl").write_text(kept_lines(kept(1.0, topic="/count")), encoding="utf-8")
+    with pytest.raises(ValueError, match=says):
+        compare_with_kept(tmp_path / "a.jsonl", kept(1.0, topic="/count"), (), tolerance, 0)
+
+
+@pytest.mark.ros
+def test_nothing_is_compared_with_nothing(ros: World) -> None:
+    """A name that no program uses, a file of another kind, and a test that has let no time pass; none is written."""
+    ros.updates_recordings = True
+    with pytest.raises(NoMessage, match=r"kept\.jsonl: no program has published anything by t = 0\.000 s"):
+        ros.record("kept.jsonl")
+    ros.run(ECHO)
+    with pytest.raises(NoMessage, match="/oot: no program publishes on it; there are /out"):
+        ros.record("kept.jsonl", "/oot")
+    with pytest.raises(ValueError, match=r"test_golden\.py: expected a name that ends with \.jsonl"):
+        ros.record("test_golden.py", "/out")
+    with pytest.raises(TypeError, match=r"expected the name of a topic, service, action or node, found \['/out'\]"):
+        ros.record("kept.jsonl", ["/out"])  # type: ignore[arg-type]
+    assert not (Path(__file__).parent / "kept.jsonl").exists()
 
 
 TEST = """

@@ -32,3 +32,10 @@ def test_a_test_has_no_node_for_a_tilde(ros: World, use: Callable[[World], objec
     text = "~/in: expected a full name, such as /NODE/in: a test has no node that ~ could stand for"
     with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):
         use(ros)
+
+
+def test_what_is_no_name_is_told(ros: World) -> None:
+    """The arguments of `publish` the wrong way round, for instance."""
+    text = "expected the name of a topic, service, action or node, found std_msgs.msg.String(data='')"
+    with pytest.raises(TypeError, match=f"^{re.escape(text)}$"):
+        ros.publish(String(), "/in")  # type: ignore[arg-type]
