@@ -113,7 +113,12 @@ def carried_fields(carried: Message | Delivery) -> Mapping[str, Any]:
 
 
 def qos_words(profile: QoSProfile | None) -> tuple[str, str]:
-    """Return reliability and durability of a QoS profile, as traces name them; None stands for the usual ones."""
+    """Return reliability and durability of a QoS profile, as traces name them; None stands for the usual ones.
+
+    Raises TypeError for anything else, such as the depth that rclpy takes in its place.
+    """
+    if profile is not None and not isinstance(profile, QoSProfile):
+        raise TypeError(f"qos: expected a QoSProfile, found {profile!r}")
     best_effort = profile is not None and profile.reliability == ReliabilityPolicy.BEST_EFFORT
     latched = profile is not None and profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     return "best_effort" if best_effort else "reliable", "transient_local" if latched else "volatile"

@@ -5,6 +5,7 @@ Nothing here sends or waits: `attend` returns what is to be done at a moment, an
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import field
 from enum import IntEnum
@@ -13,7 +14,7 @@ from typing import Any
 
 from grader.runtime.message_classes import built, message_class, plain_fields, wanted_class
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.quantities import NS_PER_S, is_number
 from grader.runtime.simulation import Moment
 from grader.runtime.stimuli.action_server import PlannedActionServer
 
@@ -70,6 +71,8 @@ class GoalState(IntEnum):
 #: The codes of an answer to a request to cancel, as in action_msgs/srv/CancelGoal: of goals that are being cancelled,
 #: of none that is known, of one that has ended.
 CANCELING, UNKNOWN_GOAL, ENDED = 0, 2, 3
+#: More steps without a pause are an endless loop in what answers a goal, which would never return.
+MOST_STEPS = 100_000
 #: What each step of a goal is: seconds to let pass, or a feedback to publish.
 Steps = Generator[Any, None, Any]
 
@@ -86,6 +89,7 @@ class _Goal:
         wake_ns: When it goes on, since the run began; None when it has ended.
         result: Its result, as fields, once it has ended.
         asked: The numbers of the requests for its result that are open.
+        is_accepted: Whether it can no longer be refused.
     """
 
     uuid: tuple[int, ...]
@@ -95,6 +99,7 @@ class _Goal:
     wake_ns: int | None = None
     result: Mapping[str, Any] = field(default_factory=dict)
     asked: list[int] = field(default_factory=list)
+    is_accepted: bool = False
 
 
 class ServedAction:
@@ -160,6 +165,7 @@ class ServedAction:
             del self._goals[uuid]
             self._does = [*before, ("send_goal", number, {"accepted": False})]
             return
+        goal.is_accepted = True
         accepted = {"accepted": True, "stamp": _time(now.clock_ns)}
         self._does = [*before, ("send_goal", number, accepted), *self._does]
         if goal.wake_ns is not None:
@@ -176,7 +182,7 @@ class ServedAction:
         if not isinstance(made, (list, tuple)):
             return made
         for step in made:
-            if isinstance(step, BaseException):
+            if isinstance(step, BaseException) or (isinstance(step, type) and issubclass(step, BaseException)):
                 raise step
             if isinstance(step, self._kind.Result):
                 return step
@@ -187,25 +193,35 @@ class ServedAction:
         """Let a goal go on until it waits, or ends."""
         try:
             step = move()
-            while isinstance(step, self._kind.Feedback):
-                message = self._kind.Impl.FeedbackMessage(feedback=step)
-                message.goal_id.uuid = list(goal.uuid)
-                self._publish("feedback", message)
+            for _ in range(MOST_STEPS):
+                if isinstance(step, self._kind.Feedback):
+                    message = self._kind.Impl.FeedbackMessage(feedback=step)
+                    message.goal_id.uuid = list(goal.uuid)
+                    self._publish("feedback", message)
+                elif pause_ns := self._pause_ns(step):
+                    goal.wake_ns = now.t_ns + pause_ns
+                    return
                 step = next(goal.steps)
+            raise RuntimeError(f"{self.name}: expected a pause, found {MOST_STEPS:,} steps at one moment")
         except StopIteration as end:
-            self._end(
-                goal, GoalState.CANCELED if goal.status is GoalState.CANCELING else GoalState.SUCCEEDED, end.value
-            )
+            status = GoalState.CANCELED if goal.status is GoalState.CANCELING else GoalState.SUCCEEDED
+            result = end.value
         except GoalCanceled as end:
-            self._end(goal, GoalState.CANCELED, end.result)
+            status, result = GoalState.CANCELED, end.result
         except GoalAborted as end:
-            self._end(goal, GoalState.ABORTED, end.result)
-        else:
-            if not isinstance(step, (int, float)) or isinstance(step, bool) or step < 0:
-                raise TypeError(f"{self.name}: expected seconds, or a {self.type} feedback, as a step, found {step!r}")
-            goal.wake_ns = now.t_ns + round(step * NS_PER_S)
-            if goal.wake_ns == now.t_ns:
-                self._go_on(goal, now, lambda: next(goal.steps))
+            status, result = GoalState.ABORTED, end.result
+        except GoalRejected as late:
+            if goal.is_accepted:
+                text = "a goal can be refused before the first pause only; after it, raise GoalAborted"
+                late.args = (f"{self.name}: {text}",)
+            raise
+        self._end(goal, status, result)
+
+    def _pause_ns(self, step: Any) -> int:
+        """Return how long a step lasts; raises TypeError for what is no step."""
+        if not is_number(step) or not 0 <= step < math.inf:
+            raise TypeError(f"{self.name}: expected seconds, or a {self.type} feedback, as a step, found {step!r}")
+        return round(float(step) * NS_PER_S)
 
     def _end(self, goal: _Goal, status: GoalState, result: Any) -> None:
         result = self._kind.Result() if result is None else result

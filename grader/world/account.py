@@ -60,7 +60,15 @@ class RunAccount:
     def no_server(self, service: str, interface: str) -> str:
         """Return why nobody offers a service of a type."""
         del interface  # it is told where there is a server of another one
+        if other := self._offers.others_offering(service):
+            return f"no program offers {service}, only {other} does"
         return telling.no_server(self._observed.graph, service)
+
+    def no_action(self, name: str) -> str:
+        """Return why nobody offers an action."""
+        other = self._offers.others_offering(name)
+        what = f"offers the action {name}"
+        return f"no program {what}, only {other} does" if other else f"nobody {what}"
 
     def timeout(self, what: str, since_ns: int, first: Mapping[str, Iterable[str]], hint: str = "") -> StepTimeout:
         """Return the error of a timeout.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from grader.runtime.message_classes import built, plain_fields
-from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.plan import derive
 from grader.runtime.serialization import type_of_part
 from grader.runtime.steps import CallService, SendGoal
@@ -14,7 +13,7 @@ from grader.world.account import RunAccount
 from grader.world.asking import GoalHandle, GoalResult, PendingCall, Received
 from grader.world.errors import StepTimeout, WrongType
 from grader.world.observed import Observed
-from grader.world.timeline import Timeline
+from grader.world.timeline import Timeline, given_ns
 
 
 class Calls:
@@ -71,7 +70,7 @@ class Calls:
         self._refuse_other_server(f"{name}/_action/send_goal", f"{interface}_SendGoal", name)
         self._goals += 1
         uuid = tuple(bytes.fromhex(derive(self._seed, "goal", str(self._goals))[:32]))
-        after_ns = 0 if cancel_after is None else max(1, round(cancel_after * NS_PER_S))
+        after_ns = 0 if cancel_after is None else max(1, given_ns("cancel_after", cancel_after))
         since_ns, seen = self._timeline.begin_ns(), len(self._observed.everything)
         planned = PlannedGoal(name, interface, since_ns, after_ns, plain_fields(goal), uuid)
         sent, asked = self._timeline.perform(SendGoal(planned))["clients"][:2]
@@ -96,7 +95,7 @@ class Calls:
 
         def too_late(_: int) -> StepTimeout:
             why = "it has accepted the goal" if look()[0] else "it has not answered the goal"
-            cause = why if self._observed.offers_action(name) else f"nobody offers the action {name}"
+            cause = why if self._observed.offers_action(name) else self._account.no_action(name)
             return self._account.timeout(f"{name} gave no result", since_ns, {"the action": [cause]})
 
         def wait(timeout: float) -> GoalResult:

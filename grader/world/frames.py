@@ -113,14 +113,14 @@ def _missing(links: Mapping[str, FrameLink], target: str, source: str, roots: tu
     frames = sorted({name for link in links.values() for name in (link.parent, link.child)})
     what = f"no transform from {source} to {target}"
     if not frames:
-        return NoTransform(f"{what}: nobody has published on /tf or /tf_static")
+        return NoTransform(f"{what}: no program has published on /tf or /tf_static")
     for name in (target, source):
         if name not in frames:
             close = nearest(name, frames)
             known = f"; there are {first_few(frames)}"
             return NoTransform(f"{what}: there is no frame {name}{known}", f"did you mean {close}?" if close else "")
     ends = f"{source} is below {roots[1]}, and {target} below {roots[0]}"
-    return NoTransform(f"{what}: {ends}: nobody publishes a link between {roots[0]} and {roots[1]}")
+    return NoTransform(f"{what}: {ends}: no program publishes a link between {roots[0]} and {roots[1]}")
 
 
 def _product(one: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:

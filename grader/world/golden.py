@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from grader.grading.model.wording import moment, nearest, quote
+from grader.runtime.model.quantities import is_number
 from grader.world.errors import RecordingDiffers
 
 #: What a difference shows of a value, in characters.
@@ -99,7 +99,7 @@ def compare_with_kept(
 
 def refuse_no_tolerance(what: str, value: Any) -> None:
     """Raise ValueError for what numbers cannot differ by."""
-    if not isinstance(value, Real) or not value >= 0:
+    if not is_number(value) or not value >= 0:
         raise ValueError(f"{what}: expected a number of at least 0, found {value!r}")
 
 

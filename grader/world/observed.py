@@ -26,6 +26,15 @@ from grader.world.golden import KeptMessage
 EVERYWHERE = ("/rosout", "/parameter_events")
 
 
+def compiled_match(match: str) -> re.Pattern[str]:
+    """Return a regular expression; raises ValueError for what is none."""
+    try:
+        return re.compile(match)
+    except re.error as error:
+        problem = str(error)
+    raise ValueError(f"expected a regular expression, found {match!r} ({problem}); re.escape takes a text as it is")
+
+
 class Observed:
     """What was observed so far; it only grows.
 
@@ -85,15 +94,14 @@ class Observed:
         # n - 1 gaps, not n: counting messages overstates a short time
         return (len(times) - 1) * NS_PER_S / (times[-1] - times[0]) if times and times[-1] > times[0] else 0.0
 
-    def texts(self, match: str, process: str | None, since: int) -> list[LogRecord | OutputLine]:
+    def texts(self, pattern: re.Pattern[str], process: str | None, since: int) -> list[LogRecord | OutputLine]:
         """Return the log records and lines of output in which a regular expression is found.
 
         Args:
-            match: The regular expression.
+            pattern: The regular expression.
             process: Whose texts they are; None for anybody's.
             since: How many observations have been searched already.
         """
-        pattern = re.compile(match)
         texts = (one for one in self.everything[since:] if isinstance(one, (LogRecord, OutputLine)))
         return [one for one in texts if process in (None, one.process) and pattern.search(one.text)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 from grader.grading.model.wording import first_few, nearest
 from grader.runtime.message_classes import built, plain_fields
 from grader.runtime.model.errors import RecordingError
-from grader.runtime.model.quantities import NS_PER_S, seconds
+from grader.runtime.model.quantities import NS_PER_S, is_number, seconds
 from grader.runtime.model.trace import Endpoint, GraphSnapshot, Observation
 from grader.runtime.serialization import QoSProfile, bytes_of, message_type_name, qos_words, serialized, service_type
 from grader.runtime.served_actions import TOPICS_OF_ACTIONS, ServedAction
@@ -60,6 +61,12 @@ class Offers:
         if topic in self._publishers:
             return "the test"
         return "a simulation" if topic in self._simulations.topics() else ""
+
+    def others_offering(self, name: str) -> str:
+        """Return who offers a service or an action besides programs, in words; empty for nobody."""
+        if name in self._functions or name in self._actions:
+            return "the test"
+        return "a simulation" if name in self._simulations.services() else ""
 
     def publish(self, command: Publish, qos: QoSProfile | None) -> None:
         """Publish messages from now on, instead of what the test has published on the topic."""
@@ -162,8 +169,8 @@ def publication(topic: str, message: Any, rate: float | None) -> Publish:
         message: The message; with a rate also a list of them.
         rate: Messages per second; None for one message.
     """
-    if rate is not None and rate <= 0:
-        raise ValueError(f"{topic}: expected a rate above 0, found {rate:g}; None publishes once")
+    if rate is not None:
+        _refuse_no_rate(topic, rate)
     several = [*message] if isinstance(message, (list, tuple)) else [message]
     if not several or (rate is None and len(several) > 1):
         raise ValueError(f"{topic}: expected one message without a rate, found {len(several)}")
@@ -187,8 +194,9 @@ def recorded_publications(bag: str | Path, path: Path, topics: Iterable[str] | N
     from grader.runtime.recording.bag import read_bag, topics_in  # noqa: PLC0415 - few tests play a recording
     from grader.runtime.recording.recording_file import OWN  # noqa: PLC0415 - the same
 
-    if rate <= 0:
-        raise ValueError(f"expected a rate above 0, found {rate:g}")
+    _refuse_no_rate("play", rate)
+    if isinstance(topics, str):
+        raise TypeError(f"play: expected a list of topics, such as [{topics!r}], found {topics!r}")
     types = topics_in(path)
     recorded = [topic for topic in types if not topic.startswith(OWN) and topic not in EVERYWHERE]
     wanted = recorded if topics is None else [*map(absolute_name, topics)]
@@ -197,10 +205,18 @@ def recorded_publications(bag: str | Path, path: Path, topics: Iterable[str] | N
         hint = f"did you mean {close}?" if close else f"it has {first_few(sorted(recorded))}"
         raise RecordingError(f"{bag}: expected the topic {lacking[0]}, found none", hint)
     streams = [read_bag(path, topic, types[topic]) for topic in wanted]
-    began_ns = min((one.began_ns for one in streams), default=0)
+    if not any(one.messages for one in streams):
+        where = f" on {first_few(wanted)}" if wanted else ""
+        raise RecordingError(f"{bag}: expected messages to play, found none{where}")
+    began_ns = min(one.began_ns for one in streams)
     for one in streams:
         times_ns = tuple(round((one.began_ns - began_ns + message.t_ns) / rate) for message in one.messages)
         yield Publish(one.topic, one.type, tuple(message.cdr for message in one.messages), times_ns=times_ns)
+
+
+def _refuse_no_rate(what: str, rate: Any) -> None:
+    if not is_number(rate) or not 0 < rate < math.inf:
+        raise ValueError(f"{what}: expected a rate above 0, found {rate!r}")
 
 
 def length_of(commands: Iterable[Publish]) -> float:

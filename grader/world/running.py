@@ -15,7 +15,7 @@ from grader.runtime.plan import Plan, PlannedStart
 from grader.runtime.steps import Command, Interrupt, Kill, LaunchFailedError, StartProcesses
 from grader.world import telling
 from grader.world.errors import ProgramFailed
-from grader.world.observed import Observed
+from grader.world.observed import Observed, compiled_match
 from grader.world.programs import Found, Runnable
 from grader.world.started import Program
 from grader.world.timeline import Timeline
@@ -205,6 +205,7 @@ class RunningPrograms:
         """Expect that a program fails in this block; see `World.expects_failure`."""
         __tracebackhide__ = True
         failure = Failure()
+        compiled_match(match)  # what is no regular expression is told before anything happens
         self._expected.append(failure)
         try:
             yield failure

@@ -19,6 +19,7 @@ from grader.runtime.simulation import SIMULATIONS, Moment, Simulation, WallMap, 
 from grader.runtime.simulation.loading import SimulationError, begin_of, guarded, made_simulation
 from grader.runtime.steps import Simulate
 from grader.world import telling
+from grader.world.names import absolute_name
 from grader.world.timeline import Timeline
 
 #: Of what a simulation draws, so much is on the page of a run.
@@ -135,3 +136,7 @@ class SimulationsOfTest:
     def topics(self) -> set[str]:
         """Return the topics that they publish on."""
         return {topic for part in self._parts for topic in part.simulation.publishes()}
+
+    def services(self) -> set[str]:
+        """Return the services that they offer."""
+        return {absolute_name(service) for part in self._parts for service in part.simulation.serves()}

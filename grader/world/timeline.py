@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
 from grader.runtime.model.errors import GraderError
-from grader.runtime.model.quantities import NS_PER_S
+from grader.runtime.model.quantities import NS_PER_S, is_number
 from grader.runtime.model.trace import ClockKind, Observation
 from grader.runtime.plan import Plan
 from grader.runtime.session import LentWorker, SteppedRun
@@ -17,6 +18,13 @@ from grader.world.observed import Observed
 Value = TypeVar("Value")
 #: How long `settle` waits on the wall clock: a reaction takes some milliseconds, tens of them on a busy machine.
 REAL_SETTLE_S = 0.1
+
+
+def given_ns(what: str, value: Any) -> int:
+    """Return seconds that a test gives as nanoseconds; raises ValueError for what is no number of seconds."""
+    if not is_number(value) or not math.isfinite(value):
+        raise ValueError(f"{what}: expected a number of seconds, found {value!r}")
+    return round(value * NS_PER_S)
 
 
 class StepSession(Protocol):
@@ -141,9 +149,10 @@ class Timeline:
     def advance(self, seconds: float) -> None:
         """Let so many seconds pass, with everything that happens at their end."""
         __tracebackhide__ = True
-        if seconds < 0:
+        duration_ns = given_ns("advance", seconds)
+        if duration_ns < 0:
             raise ValueError(f"expected seconds to advance, found {seconds:g}: time does not go back")
-        self.perform(Advance(self.begin_ns() + round(seconds * NS_PER_S)))
+        self.perform(Advance(self.begin_ns() + duration_ns))
 
     def settle(self) -> None:
         """Let everything happen that happens now; on the wall clock nobody knows when that is complete."""
@@ -159,8 +168,8 @@ class Timeline:
             too_late: Called with the time at which the wait began, in nanoseconds; returns what to raise.
         """
         __tracebackhide__ = True
-        since_ns = self.begin_ns()
-        deadline_ns = since_ns + round(timeout * NS_PER_S)
+        duration_ns, since_ns = given_ns("timeout", timeout), self.begin_ns()
+        deadline_ns = since_ns + duration_ns
         self.perform(Advance(self.run.now_ns))
         while not (found := self._looked(look)) and self.run.now_ns < deadline_ns:
             self.perform(Advance(deadline_ns, until_news=True))

@@ -39,7 +39,7 @@ from grader.world.errors import NoMessage, ParameterRejected, StepTimeout
 from grader.world.frames import TRANSFORMS, FrameTransform, last_links, transform_between
 from grader.world.golden import compare_with_kept, refuse_no_tolerance, write_kept
 from grader.world.names import absolute_name
-from grader.world.observed import Observed
+from grader.world.observed import Observed, compiled_match
 from grader.world.offering import Offers, length_of, publication, recorded_publications
 from grader.world.programs import Parameters, Runnable, given_parameters, parameter_values
 from grader.world.running import Failure, Launched, ProgramSource, ProgramStart, RunningPrograms
@@ -65,6 +65,13 @@ def _with_hint(method: Callable[Given, Value]) -> Callable[Given, Value]:
             raise error.with_traceback(None) from None
 
     return called
+
+
+def _refuse_no_program(program: Any) -> Program:
+    """Return a program; raises TypeError for anything else, such as its name."""
+    if not isinstance(program, Program):
+        raise TypeError(f"expected what run or launch has returned, found {program!r}")
+    return program
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +197,7 @@ class World:
             ProgramFailed: It has failed, or the new one has failed at once.
         """
         __tracebackhide__ = True
-        if not self._programs.can_restart(program):
+        if not self._programs.can_restart(_refuse_no_program(program)):
             raise ValueError(
                 f"{program.name}: expected a program that was started with run, found one of a launch file"
             )
@@ -284,15 +291,17 @@ class World:
 
         Raises:
             StepTimeout: Nothing of that kind came in time.
+            ValueError: It is no regular expression.
             ProgramFailed: A program has failed meanwhile.
         """
         __tracebackhide__ = True
-        process, seen = None if program is None else program.name, 0
+        process, seen = None if program is None else _refuse_no_program(program).name, 0
+        pattern = compiled_match(match)
 
         def look() -> list[LogRecord | OutputLine]:
             nonlocal seen
             since, seen = seen, len(self._observed.everything)
-            return self._observed.texts(match, process, since)
+            return self._observed.texts(pattern, process, since)
 
         def too_late(since_ns: int) -> StepTimeout:
             who = "no program has" if process is None else f"{process} has not"

@@ -74,7 +74,7 @@ def test_the_last_transform_of_a_frame_counts() -> None:
             "map",
             "base",
             "no transform from base to map: base is below odom, and map below map: "
-            "nobody publishes a link between map and odom",
+            "no program publishes a link between map and odom",
             "",
         ),
     ],
@@ -91,11 +91,11 @@ def test_what_is_missing_is_named(target: str, source: str, reason: str, hint: s
 def test_a_loop_and_a_rotation_that_is_none_are_told() -> None:
     """Neither hangs nor gives a number."""
     loop = last_links([message("a", "b"), message("b", "a"), message("map", "dock")])
-    with pytest.raises(NoTransform, match="nobody publishes a link between"):
+    with pytest.raises(NoTransform, match="no program publishes a link between"):
         transform_between(loop, "map", "a")
     with pytest.raises(NoTransform, match="base in map: expected a quaternion, found"):
         last_links([message("map", "base", turned=(0, 0, 0, 0))])
-    with pytest.raises(NoTransform, match="nobody has published on /tf or /tf_static"):
+    with pytest.raises(NoTransform, match="no program has published on /tf or /tf_static"):
         transform_between({}, "map", "base")
 
 
@@ -141,7 +141,9 @@ def test_frames_of_a_node(ros_session: Worlds, tmp_path: Path) -> None:
     (tmp_path / "frames.py").write_text(NODE, encoding="utf-8")
     with ros_session.open(tmp_path) as ros:
         ros.run("frames.py")
-        with pytest.raises(NoTransform, match="laser is below base_link, and map below map: nobody publishes a link"):
+        with pytest.raises(
+            NoTransform, match="laser is below base_link, and map below map: no program publishes a link"
+        ):
             ros.transform("map", "laser")
         ros.advance(2.0)
         laser = ros.transform("map", "laser")

@@ -1,5 +1,6 @@
 """What goes on while a test lets time pass: calls, goals, restarts, recordings; with real nodes."""
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -182,6 +183,55 @@ def test_a_recording_is_played(ros_session: Worlds, write: Write, tmp_path: Path
         assert [(log.t_ns / 1e9, log.text) for log in listener.logs][5:] == [(3.0, "2"), (3.75, "2")]
         with pytest.raises(RecordingError, match="expected the topic /on, found none"):
             ros.play("kept/recording.mcap", topics=["/on"])
+        with pytest.raises(TypeError, match=r"play: expected a list of topics, such as \['/one'\], found '/one'"):
+            ros.play("kept/recording.mcap", topics="/one")
+        with pytest.raises(RecordingError, match="expected messages to play, found none"):
+            ros.play("kept/recording.mcap", topics=[])
+        for rate in (0, -1.0, math.nan, math.inf, "2"):
+            with pytest.raises(ValueError, match="play: expected a rate above 0, found"):
+                ros.play("kept/recording.mcap", rate=rate)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("use", "error", "says"),
+    [
+        (lambda ros: ros.advance(math.nan), ValueError, "advance: expected a number of seconds, found nan"),
+        (lambda ros: ros.advance("1"), ValueError, "advance: expected a number of seconds, found '1'"),
+        (lambda ros: ros.wait_until(bool, math.inf), ValueError, "timeout: expected a number of seconds, found inf"),
+        (lambda ros: ros.publish("/a", Int32(), rate=math.nan), ValueError, "/a: expected a rate above 0, found nan"),
+        (lambda ros: ros.publish("/a", Int32(), qos=10), TypeError, "qos: expected a QoSProfile, found 10"),
+        (lambda ros: ros.restart("node.py"), TypeError, "expected what run or launch has returned, found 'node.py'"),
+        (
+            lambda ros: ros.wait_for_log("ready", 1.0, program="node.py"),
+            TypeError,
+            "expected what run or launch has returned, found 'node.py'",
+        ),
+        (
+            lambda ros: ros.wait_for_log("speed (", 1.0),
+            ValueError,
+            r"expected a regular expression, found 'speed \(' \(.*\); re.escape takes a text as it is",
+        ),
+        (
+            lambda ros: ros.call("/mine", Trigger.Request(), timeout=1.0),
+            StepTimeout,
+            "no program offers /mine, only the test does",
+        ),
+        (
+            lambda ros: ros.send_goal("/ours", Fibonacci.Goal(), timeout=1.0),
+            StepTimeout,
+            "no program offers the action /ours, only the test does",
+        ),
+    ],
+)
+def test_what_makes_no_sense_is_told(
+    ros: World, use: Callable[[World], Any], error: type[Exception], says: str
+) -> None:
+    """With what was expected; what is said of a service is true."""
+    ros.serve("/mine", Trigger, lambda _: Trigger.Response())
+    ros.serve_action("/ours", Fibonacci, [])
+    with pytest.raises(error, match=says) as told:
+        use(ros)
+    assert told.value.__context__ is None
 
 
 ASKING = """

@@ -38,4 +38,4 @@ def test_what_is_no_name_is_told(ros: World) -> None:
     """The arguments of `publish` the wrong way round, for instance."""
     text = "expected the name of a topic, service, action or node, found std_msgs.msg.String(data='')"
     with pytest.raises(TypeError, match=f"^{re.escape(text)}$"):
-        ros.publish(String(), "/in")  # type: ignore[arg-type]
+        ros.publish(String(), "/in")

@@ -1,6 +1,7 @@
 """Units of time and size, comparisons of numbers, and the kinds of values that rubrics write in their own forms."""
 
-from typing import Annotated
+from numbers import Real
+from typing import Annotated, TypeGuard
 
 from grader.runtime.model.dataclass import dataclass
 
@@ -17,6 +18,11 @@ SLACK = 1e-9
 def seconds(t_ns: int) -> float:
     """Convert nanoseconds to seconds, for text and rates."""
     return t_ns / NS_PER_S
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is a real number, also one of numpy; a boolean is none."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def nanoseconds(seconds_: float) -> int:
