@@ -218,7 +218,7 @@ class ServedAction:
         self._end(goal, status, result)
 
     def _pause_ns(self, step: Any) -> int:
-        """Return how long a step lasts; raises TypeError for what is no step."""
+        """Return how long a step lasts; raises TypeError if it is not a step."""
         if not is_number(step) or not 0 <= step < math.inf:
             raise TypeError(f"{self.name}: expected seconds, or a {self.type} feedback, as a step, found {step!r}")
         return round(float(step) * NS_PER_S)

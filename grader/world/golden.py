@@ -72,7 +72,7 @@ def compare_with_kept(
 
     Raises:
         RecordingDiffers: They differ, or there is no such recording.
-        ValueError: The file is no recording, or a tolerance is none.
+        ValueError: The file is not a recording, or a tolerance is invalid.
 
     Args:
         path: The recording.

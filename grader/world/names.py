@@ -7,7 +7,7 @@ def absolute_name(name: str) -> str:
     """Return a name with the slash that it begins with; a test lies in no namespace.
 
     Raises:
-        TypeError: It is no text.
+        TypeError: It is not text.
         ValueError: It begins with `~`, for which a program puts the name of its node: a test has none.
     """
     if not isinstance(name, str):

@@ -27,7 +27,7 @@ EVERYWHERE = ("/rosout", "/parameter_events")
 
 
 def compiled_match(match: str) -> re.Pattern[str]:
-    """Return a regular expression; raises ValueError for what is none."""
+    """Return a regular expression; raises ValueError if it is invalid."""
     try:
         return re.compile(match)
     except re.error as error:

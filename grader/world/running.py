@@ -205,7 +205,7 @@ class RunningPrograms:
         """Expect that a program fails in this block; see `World.expects_failure`."""
         __tracebackhide__ = True
         failure = Failure()
-        compiled_match(match)  # what is no regular expression is told before anything happens
+        compiled_match(match)  # a mistake in it is told before anything happens
         self._expected.append(failure)
         try:
             yield failure

@@ -21,7 +21,7 @@ REAL_SETTLE_S = 0.1
 
 
 def given_ns(what: str, value: Any) -> int:
-    """Return seconds that a test gives as nanoseconds; raises ValueError for what is no number of seconds."""
+    """Return seconds that a test gives as nanoseconds; raises ValueError if it is not a finite number."""
     if not is_number(value) or not math.isfinite(value):
         raise ValueError(f"{what}: expected a number of seconds, found {value!r}")
     return round(value * NS_PER_S)

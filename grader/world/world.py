@@ -291,7 +291,7 @@ class World:
 
         Raises:
             StepTimeout: Nothing of that kind came in time.
-            ValueError: It is no regular expression.
+            ValueError: It is not a regular expression.
             ProgramFailed: A program has failed meanwhile.
         """
         __tracebackhide__ = True
@@ -597,7 +597,7 @@ class World:
         Raises:
             RecordingDiffers: It differs, or there is no such recording.
             NoMessage: No program has published on one of the topics, or on any.
-            ValueError: The file has another ending or is no recording, or a tolerance is none.
+            ValueError: The file has another ending or is not a recording, or a tolerance is invalid.
         """
         __tracebackhide__ = True
         if not self._near:

@@ -21,7 +21,7 @@ def seconds(t_ns: int) -> float:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Return whether a value is a real number, also one of numpy; a boolean is none."""
+    """Return whether a value is a real number, also one of numpy; a boolean does not count."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
