@@ -212,16 +212,17 @@ def _runnable(found: Found) -> list[Executable]:
 
 def given_parameters(
     given: Parameters | Sequence[Parameters] | None, near: Sequence[Path]
-) -> tuple[dict[str, Any], tuple[tuple[str, str], ...]]:
-    """Return what a program is given: values by their names, and name and text of parameter files.
+) -> tuple[dict[str, Any], tuple[tuple[str, str], ...], tuple[str, ...]]:
+    """Return what a program is given: values by their names, name and text of parameter files, and all names of values.
 
     Values that come beside files become a file as well, because rcl lets those on the command line count least.
 
     Raises SubmissionError if there is no such file.
     """
     several = [given] if isinstance(given, (Mapping, str, os.PathLike)) else [*(given or ())]
+    values = {name: value for one in several if isinstance(one, Mapping) for name, value in one.items()}
     if all(isinstance(one, Mapping) for one in several):
-        return {name: value for one in several if isinstance(one, Mapping) for name, value in one.items()}, ()
+        return values, (), tuple(values)
     files: list[tuple[str, str]] = []
     for one in several:
         if isinstance(one, Mapping):
@@ -233,7 +234,7 @@ def given_parameters(
             where = first_few([str(folder) for folder in near])
             raise SubmissionError(f"{os.fspath(one)}: expected a parameter file, found none", f"looked in {where}")
         files.append((path.name, path.read_text(encoding="utf-8")))
-    return {}, tuple(files)
+    return {}, tuple(files), tuple(values)
 
 
 def parameter_values(parameters: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -169,7 +169,7 @@ class World:
         """
         __tracebackhide__ = True
         found = self._programs.find(program)
-        values, files = given_parameters(parameters, self._near)
+        values, files, names = given_parameters(parameters, self._near)
         start = PlannedStart(
             found.name,
             executable=found.executable,
@@ -177,7 +177,7 @@ class World:
             ros_arguments=ros_arguments(name, namespace, (remappings or {}).items(), parameter_values(values)),
             parameter_files=files,
         )
-        return self._programs.start(ProgramStart(found, start, dict(env or {}), tuple(values), dict(remappings or {})))
+        return self._programs.start(ProgramStart(found, start, dict(env or {}), names, dict(remappings or {})))
 
     @noted_call
     def restart(self, program: Program, *, timeout: float = 10.0) -> Program:

@@ -154,6 +154,10 @@ def test_parameter_files_lie_beside_the_test(ros_session: Worlds, write: Write, 
         assert said == ["[1, 1, 1.5]", "[1, 2, 2.0]", "[1, 1, 1.5]", "[3, 2, 0.0]"]
         with pytest.raises(SubmissionError, match=r"two\.yaml: expected a parameter file, found none"):
             ros.run("node.py", parameters="two.yaml")
+    with ros_session.open(tmp_path) as ros:
+        ros.run("node.py", parameters=["one.yaml", {"ab": 1}])
+        told = [text.partition(";")[0] for text in ros.remarks]
+        assert told == ["node.py: the parameter ab was given, but no node of it declares that"]
 
 
 def test_a_recording_is_played(ros_session: Worlds, write: Write, tmp_path: Path) -> None:
