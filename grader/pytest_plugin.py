@@ -322,7 +322,8 @@ def pytest_runtest_makereport(
         repeating = "repeat it with" if world.repeats else "the same delays and losses are drawn with"
         drawn = [f"seed {world.seed}: {repeating} --ros-seed {world.seed}"] if world.is_drawn else []
         kept = list(_kept(item, world, call.excinfo))  # closes the world, which then has all of its remarks
-        lines = [*item.stash.get(pytest_races.TOLD, []), *drawn, *world.remarks, *kept]
+        told = [*world.remarks, *_undebugged(world, item.config)]
+        lines = [*item.stash.get(pytest_races.TOLD, []), *drawn, *told, *kept]
         report.sections.append(("ros", "\n".join(lines)))
         item.user_properties += [("ros", line) for line in lines]  # which files for JUnit hold
     return report
@@ -343,6 +344,15 @@ def _of_test(error: BaseException, path: Path) -> BaseException:
     for entry in reversed(entries):
         found = TracebackType(found, entry.tb_frame, entry.tb_lasti, entry.tb_lineno)
     return error.with_traceback(found)
+
+
+def _undebugged(world: World, config: pytest.Config) -> Iterator[str]:
+    """Yield how to debug the programs that have met a breakpoint without a debugger."""
+    if config.getoption("--ros-debug") or config.getoption("--ros-debug-port") is not None:
+        return  # whoever quits a debugger ends the program in the same way
+    for program in world.programs:
+        if program.fault is not None and program.fault.exception == "bdb.BdbQuit":
+            yield f"{program.name}: there is no debugger at its breakpoint; pytest --ros-debug opens one"
 
 
 def _seed_options(world: World) -> list[str]:

@@ -2,6 +2,7 @@
 
 import json
 import socket
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -64,6 +65,14 @@ def test_pdb_changes_a_value_while_virtual_time_waits(folder: Path) -> None:
         shell.expect(pexpect.EOF)
         text = shell.before
     assert "1 passed" in text, text
+
+
+def test_a_breakpoint_without_a_debugger_names_the_option(folder: Path) -> None:
+    """The program ends with BdbQuit, because pdb has nothing to read."""
+    command = [sys.executable, "-m", "pytest", "-p", "grader.pytest_plugin", "-p", "no:cacheprovider", "test_it.py"]
+    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    told = "counts.py: there is no debugger at its breakpoint; pytest --ros-debug opens one"
+    assert told in done.stdout.splitlines(), done.stdout
 
 
 class Editor:
