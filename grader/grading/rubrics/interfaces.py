@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
@@ -21,17 +23,18 @@ from grader.grading.rubrics.types import plain_value
 from grader.grading.rubrics.yaml_tree import Mistake, Position, TreePath, YamlTree
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.errors import HarnessError
-from grader.runtime.model.quantities import FieldOf
+from grader.runtime.model.quantities import FieldOf, counted
 from grader.runtime.model.scenario import Stimulus
 from grader.runtime.model.submission import Definition
 from grader.runtime.model.wording import listed, printable
 
 #: Numbers of type_description_interfaces/msg/FieldType: a nested message, integers, floating-point numbers, and so on.
 #: Arrays add 48, bounded sequences 96 and unbounded ones 144.
-_NESTED, _NUMBERS, _BOOLEAN, _TEXTS = 1, range(2, 13), 15, range(17, 23)
+_NESTED, _NUMBERS, _BOOLEAN, _TEXTS = 1, (*range(2, 14), 16), 15, range(17, 23)
 _ARRAY, _SEQUENCE = 48, 96
 _BOUNDED, _UNBOUNDED = _SEQUENCE, 144
 _BOUNDED_TEXTS = (21, 22)
+_FLOAT32, _BYTE = 10, 16
 #: The names of these types in .msg files; a char is an uint8 there.
 _PRIMITIVES: Mapping[int, str] = {
     2: "int8",
@@ -51,6 +54,8 @@ _PRIMITIVES: Mapping[int, str] = {
     16: "byte",
     **{number: "wstring" if number % 2 == 0 else "string" for number in range(17, 23)},
 }
+#: The greatest number that the classes of messages take for a float32, apart from an infinite one.
+_GREATEST_FLOAT32 = 3.402823466e38
 #: What separates the definitions of nested types from each other in the text of a message type.
 _RULE = "=" * 80
 _KINDS = {"msg": "message", "srv": "service", "action": "action"}
@@ -101,11 +106,38 @@ class Field(msgspec.Struct):
 
     @property
     def words(self) -> str:
-        """What its value is, e.g. `a list of numbers`."""
-        one, many = {_NESTED: ("a mapping", "mappings"), _BOOLEAN: ("true or false", "true or false")}.get(
-            self.element, ("a number", "numbers") if self.element in _NUMBERS else ("text", "texts")
+        """What its value is, e.g. `a list of 3 numbers`, without the limits of numbers."""
+        one, many = {_NESTED: ("a mapping", "mapping"), _BOOLEAN: ("true or false", "boolean")}.get(
+            self.element, ("a number", "number") if self.element in _NUMBERS else ("text", "text")
         )
-        return f"a list of {many}" if self.is_list else one
+        if not self.is_list:
+            return one
+        most = "at most " if self.type.type_id > _SEQUENCE else ""
+        return f"a list of {most}{counted(self.type.capacity, many)}" if self.type.capacity else f"a list of {many}s"
+
+    @property
+    def integers(self) -> range | None:
+        """The integers that it holds; None if it is no integer."""
+        name = "uint8" if self.element == _BYTE else _PRIMITIVES.get(self.element, "")
+        unsigned, is_integer, bits = name.partition("int")
+        if self.is_list or not is_integer:
+            return None
+        return range(2 ** int(bits)) if unsigned else range(-(2 ** int(bits) // 2), 2 ** int(bits) // 2)
+
+    def instead_of(self, value: object) -> str:
+        """Return what it holds, instead of a value that it cannot hold: e.g. `an integer from 0 to 255`."""
+        if (integers := self.integers) is not None:
+            return f"an integer from {integers[0]:,} to {integers[-1]:,}"
+        if self.element == _FLOAT32 and not self.is_list and isinstance(value, (int, float)):
+            return f"a number from {-_GREATEST_FLOAT32} to {_GREATEST_FLOAT32}"
+        if self.element in _BOUNDED_TEXTS and not self.is_list:
+            return f"text of at most {counted(self.type.string_capacity, 'character')}"
+        return self.words
+
+    def holds_as_many(self, count: int) -> bool:
+        """Return whether it is a list that may have so many elements."""
+        most = self.type.capacity or count
+        return self.is_list and (count <= most if self.type.type_id > _SEQUENCE else count == most)
 
 
 class _Description(msgspec.Struct):
@@ -332,14 +364,17 @@ class _Checked:
             if name not in (known or {}):
                 return f"what it publishes on {where} has a field `{printable(name)}`: {_no_field(type_, known or {})}"
             field = (known or {})[name]
-            items = inner if field.is_list and isinstance(inner, (list, tuple)) else [inner]
-            for item in items:
+            is_list = field.is_list and isinstance(inner, (list, tuple))
+            if is_list and not field.holds_as_many(len(inner)):
+                return f"what it publishes on {where} has {found(list(inner))} in `{name}`, expected {field.words}"
+            for item in inner if is_list else [inner]:
                 if field.element == _NESTED and isinstance(item, Mapping):
                     found_ = self._wrong_output(item, field.type.nested_type_name, f"{where} in `{name}`")
                     if found_:
                         return found_
                 elif isinstance(item, Mapping) or (isinstance(item, _PLAIN) and not _fits(item, field.item(name))):
-                    return f"what it publishes on {where} has {found(item)} in `{name}`, expected {field.words}"
+                    wanted = (field.item(name) if is_list else field).instead_of(item)
+                    return f"what it publishes on {where} has {found(item)} in `{name}`, expected {wanted}"
         return ""
 
     def _in_message(self, value: Mapping[str, object], type_: str, path: TreePath) -> Iterator[Mistake]:
@@ -352,13 +387,17 @@ class _Checked:
                 yield from self._in_value(inner, known[name], (*path, name))
 
     def _in_value(self, value: object, field: Field, path: TreePath) -> Iterator[Mistake]:
-        if field.is_list and isinstance(value, list):
+        if isinstance(value, list) and field.holds_as_many(len(value)):
             for index, item in enumerate(value):
                 yield from self._in_value(item, field.item(field.name), (*path, index))
         elif field.element == _NESTED and not field.is_list and isinstance(value, Mapping):
             yield from self._in_message(value, field.type.nested_type_name, path)
+        elif isinstance(value, Mapping) and value.keys() & {"between", "choose"} and not field.is_list:  # a draw
+            key = next(key for key in ("text", "choose", "between") if key in value)
+            for index, item in enumerate([value[key]] if key == "text" else value[key]):
+                yield from self._in_value(item, field, (*path, key) if key == "text" else (*path, key, index))
         elif not _fits(value, field):
-            text = f"expected {field.words} for `{field.name}`, found {found(value)}"
+            text = f"expected {field.instead_of(value)} for `{field.name}`, found {found(value)}"
             yield self._tree.at(path).mistake(text)
 
     def in_criteria(self) -> Iterator[Mistake]:
@@ -447,16 +486,23 @@ def _cases(raw: Any, path: TreePath) -> Iterator[tuple[TreePath, Mapping[str, ob
 
 
 def _fits(value: object, field: Field) -> bool:
-    """Return whether a field may hold a value; a mapping for a number or text is a draw, which is checked elsewhere."""
+    """Return whether a field that is no list may hold a value, as `message_classes.built` puts it into a message."""
     if field.is_list or field.element == _NESTED:
         return False
-    if isinstance(value, Mapping):
-        return True
     if field.element in _NUMBERS:
-        return isinstance(value, (int, float)) and not isinstance(value, bool)
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and _is_in_range(value, field)
     if field.element == _BOOLEAN:
         return isinstance(value, bool)
+    if field.element in _BOUNDED_TEXTS:
+        return isinstance(value, str) and len(value) <= field.type.string_capacity
     return field.element not in _TEXTS or isinstance(value, str)
+
+
+def _is_in_range(value: float, field: Field) -> bool:
+    if (integers := field.integers) is not None:  # a message takes 2.0 as an integer
+        return (isinstance(value, int) or value.is_integer()) and int(value) in integers
+    greatest = _GREATEST_FLOAT32 if field.element == _FLOAT32 else sys.float_info.max
+    return not greatest < abs(value) < math.inf
 
 
 def _paths(part: object, path: TreePath) -> Iterator[tuple[TreePath, FieldOf, object]]:

@@ -205,6 +205,26 @@ def test_a_value_that_does_not_fit_its_field_is_told(tmp_path: Path, fields: str
     assert told in error.value.message
 
 
+@pytest.mark.parametrize(
+    ("type_", "fields", "told"),
+    [
+        ("std_msgs/msg/Int8", '{"data": 128}', "has `128` in `data`, expected an integer from -128 to 127"),
+        ("std_msgs/msg/UInt8MultiArray", '{"data": [1, 2.5]}', "`2.5` in `data`, expected an integer from 0 to 255"),
+        (
+            "geometry_msgs/msg/PoseWithCovariance",
+            '{"covariance": [0.0]}',
+            "a list of 1 in `covariance`, expected a list",
+        ),
+    ],
+)
+def test_a_number_or_a_count_outside_of_its_field_is_told(tmp_path: Path, type_: str, fields: str, told: str) -> None:
+    """As for the values that a rubric writes."""
+    world = WORLD.replace("std_msgs/msg/Float32", type_).replace('{"data": self.gain}', fields)
+    with pytest.raises(RubricError) as error:
+        read_rubric(written(tmp_path, world=world), interfaces=known_interfaces())
+    assert told in error.value.message
+
+
 def test_numbers_in_lists_and_nested_messages_fit(tmp_path: Path) -> None:
     """As a scanner publishes them."""
     world = WORLD.replace("std_msgs/msg/Float32", "sensor_msgs/msg/LaserScan")
