@@ -117,7 +117,7 @@ class Field(msgspec.Struct):
 
     @property
     def integers(self) -> range | None:
-        """The integers that it holds; None if it is no integer."""
+        """The integers that it holds; None if it is something else."""
         name = "uint8" if self.element == _BYTE else _PRIMITIVES.get(self.element, "")
         unsigned, is_integer, bits = name.partition("int")
         if self.is_list or not is_integer:
@@ -486,7 +486,7 @@ def _cases(raw: Any, path: TreePath) -> Iterator[tuple[TreePath, Mapping[str, ob
 
 
 def _fits(value: object, field: Field) -> bool:
-    """Return whether a field that is no list may hold a value, as `message_classes.built` puts it into a message."""
+    """Return whether a field that is not a list may hold a value, as `message_classes.built` puts it into a message."""
     if field.is_list or field.element == _NESTED:
         return False
     if field.element in _NUMBERS:
