@@ -11,7 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from grader.grading.judging.agreement import ClockDifference, differences, observation_start, sentence
-from grader.grading.judging.idle_machine import quicker
+from grader.grading.judging.beginnings import cut
+from grader.grading.judging.idle_machine import quicker, shown_until_ns
 from grader.runtime.model.dataclass import dataclass
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.trace import AssessedTrace, ClockKind
@@ -207,6 +208,10 @@ class _Checked:
         busy = bool(found and wall.harness_problem) or (judged.unsure and not found)
         if found and not judged.lost:  # the checks of criteria have been asked about an idle machine already
             busy = busy or any(not differences(self.recorded, one, first_message_on) for one in quicker(wall))
+            # nor do they know of what the programs had no time for
+            shown = cut(self.recorded, shown_until_ns(self.recorded, wall, starts_ns))
+            late = {(one.aspect, one.name) for one in differences(shown, wall, first_message_on)}
+            busy = busy or not any((one.aspect, one.name) in late for one in found)
         return next(iter(found), None), busy
 
     def disagreement(self, record: Record) -> tuple[ClockDifference | None, bool]:

@@ -338,10 +338,11 @@ def _logs(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
 
 
 def _endpoints(virtual: _Window, wall: _Window) -> Iterator[ClockDifference]:
-    early = [g for g in virtual.trace.graphs() if g.t_ns < virtual.stop_ns - EDGE_NS]
-    lasting = {key for g in early for key in _keys(g)}
-    ever = {key for g in virtual.trace.graphs() for key in _keys(g)}
-    seen = {key for g in wall.trace.graphs() for key in _keys(g)}
+    stop_ns = min(virtual.stop_ns, virtual.trace.stop_ns)
+    early = [g for g in virtual.trace.graphs() if g.t_ns < stop_ns - EDGE_NS]
+    lasting = {key for g in early for key in ends_in(g)}
+    ever = {key for g in virtual.trace.graphs() for key in ends_in(g)}
+    seen = {key for g in wall.trace.graphs() for key in ends_in(g)}
     for kind, name, type_ in sorted(lasting - seen):
         yield ClockDifference(Aspect.ENDPOINT, f"the {kind} of {name} [{type_}]", "there", "not there")
     for kind, name, type_ in sorted(seen - ever):
@@ -357,7 +358,8 @@ def _limits(virtual: Trace, wall: Trace) -> Iterator[ClockDifference]:
         yield ClockDifference(Aspect.LIMIT, "the recording", "complete", found, by_load=False)
 
 
-def _keys(graph: GraphSnapshot) -> Iterator[tuple[str, str, str]]:
+def ends_in(graph: GraphSnapshot) -> Iterator[tuple[str, str, str]]:
+    """Yield kind, name and type of what communicates in a graph: publishers, subscriptions, services and clients."""
     yield from ((e.kind, e.topic, e.type) for e in graph.endpoints)
     yield from ((s.kind, s.service, s.type) for s in graph.services)
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from grader.grading.judging.agreement import Aspect, ClockDifference
+from grader.grading.judging.idle_machine import shown_until_ns
 from grader.grading.judging.run_check import for_beginning, run_check
 from grader.grading.model.exercise import Criterion, Exercise
 from grader.runtime.model.dataclass import dataclass
@@ -92,6 +93,7 @@ class BeginningJudge:
             for cut_ns in CUTS_NS
             if cut_ns < length_ns
         ]
+        until_ns = shown_until_ns(first, second, starts_ns)
         lost: list[ClockDifference] = []
         unsure = False
         for whole, part in self._criteria:
@@ -103,6 +105,9 @@ class BeginningJudge:
                 unsure = True
                 continue
             before, after = next((before, after) for before, after in judged if after is not None)
+            if until_ns < starts_ns[0] + length_ns and (self._credit(part, cut(first, until_ns)) or 0) < before:
+                unsure = True  # the machine was so busy that the programs had no time for it
+                continue
             lost.append(ClockDifference(Aspect.CRITERION, whole.title, _words(before), _words(after)))
         return Comparison(tuple(lost), unsure)
 

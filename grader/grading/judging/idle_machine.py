@@ -1,10 +1,11 @@
-"""Returns what an idle machine may have recorded, given a recording of a busy one; pure."""
+"""Returns what an idle machine may have recorded, and how much of that a busy one has had time to show; pure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
 
+from grader.grading.judging.agreement import ends_in
 from grader.runtime.model.trace import (
     AssessedTrace,
     ClockKind,
@@ -50,6 +51,38 @@ def quicker(assessed: AssessedTrace) -> Iterator[Trace]:
         yield _begun_earlier(trace, late_ns * step // _DELAYS)
         yield _answered_earlier(trace, late_ns * step // _DELAYS)
     yield from (_logged_earlier(trace, late_ns * step // _DELAYS) for step in range(1, _DELAYS + 1) if late_ns)
+
+
+def shown_until_ns(idle: Trace, busy: AssessedTrace, starts_ns: tuple[int, int]) -> int:
+    """Return until when a recording of an idle machine tells what another one has had time to show.
+
+    Where the nodes waited for a processor, they come up later, by no more than all of them waited together, and are
+    slower from then on.
+
+    Args:
+        idle: The whole recording.
+        busy: Another one of the same plan, on the wall clock.
+        starts_ns: When the observation began in each.
+    """
+    length_ns = busy.stop_ns - starts_ns[1]
+    if busy.most_starved_ns <= _ORDINARY_WAIT * busy.stop_ns:
+        return starts_ns[0] + length_ns
+    if not starts_ns[1]:  # nothing may have come that begins the observation
+        starts_ns = 0, 0
+    wanted, seen = (_first_seen(t, start_ns) for t, start_ns in zip((idle, busy.recorded), starts_ns, strict=True))
+    late_ns = max((seen.get(end, length_ns) - t_ns for end, t_ns in wanted.items() if t_ns < length_ns), default=0)
+    late_ns = max(0, min(late_ns, busy.all_starved_ns, length_ns))
+    own_share = 1 - min(_LONGEST_WAIT, busy.most_starved_ns / busy.stop_ns)
+    return starts_ns[0] + round((length_ns - late_ns) * own_share)
+
+
+def _first_seen(trace: Trace, start_ns: int) -> dict[tuple[str, str, str], int]:
+    """Return how long after a time each end was first in the graph, in nanoseconds."""
+    found: dict[tuple[str, str, str], int] = {}
+    for graph in trace.graphs():
+        for end in ends_in(graph):
+            found.setdefault(end, max(0, graph.t_ns - start_ns))
+    return found
 
 
 def _begun_earlier(trace: Trace, by_ns: int) -> Trace:

@@ -105,6 +105,17 @@ def test_who_is_neither_drawn_nor_suspected_is_not_checked() -> None:
     assert recorder.plans == []
 
 
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_silence_of_programs_that_had_no_time_is_no_disagreement(share: float) -> None:
+    """Half of the time would have been enough to publish something; a tenth of it is not."""
+    nothing = replace(TraceBuilder("a.py", clock=ClockKind.WALL).trace(), scenario="alone")
+    silent = replace(nothing, most_starved_ns=round(share * nothing.stop_ns))
+    enough = share == 0.5
+    speaks = TraceBuilder("a.py").messages("/x", FLOAT, {"data": RIGHT}, rate_hz=2.0, start_s=3.0).trace()
+    found = checked(Recorder(*[silent] * 3), reaches=(), share=1.0, virtual=replace(speaks, scenario="alone"))
+    assert (found.clock is ClockKind.WALL, bool(found.unchecked)) == (enough, not enough)
+
+
 def test_where_the_clocks_agree_virtual_time_counts() -> None:
     """One short recording, with nothing of the grader in the process."""
     recorder = Recorder(SAME)

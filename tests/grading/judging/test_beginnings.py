@@ -23,7 +23,7 @@ from grader.grading.model.exercise import Check, Criterion, Exercise, Finding, o
 from grader.grading.rubrics.exercise_checks import known_checks
 from grader.runtime.model.scenario import Scenario, Span
 from grader.runtime.model.submission import StudentFile, Submission
-from grader.runtime.model.trace import AssessedTrace, ClockKind, Request, Response, Trace
+from grader.runtime.model.trace import AssessedTrace, ClockKind, Endpoint, GraphSnapshot, Request, Response, Trace
 from grader.testing import TraceBuilder
 
 S = 1_000_000_000
@@ -197,6 +197,33 @@ def test_a_busy_machine_leaves_it_open() -> None:
     assert judge_of(RATE).compare(recorded(swinging()), slow, (0, 0)) == Comparison(unsure=True)
     right = replace(on_wall(swinging()), most_starved_ns=S, harness_problem="the machine was too busy")
     assert judge_of(RATE).compare(recorded(swinging()), right, (0, 0)) == Comparison()
+
+
+@pytest.mark.parametrize(
+    ("appears_s", "most_s", "all_s", "unsure"),
+    [
+        pytest.param(0.0, 0.0, 0.0, False, id="it does nothing"),
+        pytest.param(0.0, 1.0, 1.0, False, id="four fifths of the time were its own"),
+        pytest.param(0.0, 4.5, 4.5, True, id="a tenth of the time was its own"),
+        pytest.param(4.2, 0.0, 0.0, False, id="it comes late"),
+        pytest.param(4.2, 0.5, 1.0, False, id="it may have come a second earlier"),
+        pytest.param(4.2, 0.5, 3.9, True, id="it may have come four seconds earlier"),
+    ],
+)
+def test_programs_that_had_no_time_on_a_busy_machine_lose_nothing(
+    appears_s: float, most_s: float, all_s: float, unsure: bool
+) -> None:
+    """Where a program was in the graph late or waited most of the time, it is not known what it would have done."""
+
+    def appearing(at_s: float) -> GraphSnapshot:
+        end = Endpoint("publisher", "/joint", FLOAT, "/a", 0, "reliable", "volatile")
+        return GraphSnapshot(round(at_s * S), ("/a",), (end,))
+
+    virtual = recorded(lambda b: b.log(1.0, "hello").add(appearing(0.0)))
+    silent = on_wall(lambda b: b.add(appearing(appears_s)))
+    busy = replace(silent, most_starved_ns=round(most_s * S), all_starved_ns=round(all_s * S))
+    found = judge_of(UsesLogger(FILE)).compare(virtual, busy, (0, 0))
+    assert (bool(found.lost), found.unsure) == (not unsure, unsure)
 
 
 def test_a_check_is_as_short_as_its_criteria_allow() -> None:
