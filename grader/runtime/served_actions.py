@@ -73,6 +73,10 @@ class GoalState(IntEnum):
 CANCELING, UNKNOWN_GOAL, ENDED = 0, 2, 3
 #: More steps without a pause are an endless loop in what answers a goal, which would never return.
 MOST_STEPS = 100_000
+#: A status names the goals whose status changed last, up to this number. A server of ROS names all that it has not
+#: forgotten, which costs the square of their number with a client that sends without end; a client reads a status only
+#: for what has changed.
+MOST_TOLD = 20
 #: What each step of a goal is: seconds to let pass, or a feedback to publish.
 Steps = Generator[Any, None, Any]
 
@@ -126,6 +130,9 @@ class ServedAction:
         self.preempts = preempts
         self._kind = wanted_class(type, "action", name)
         self._goals: dict[tuple[int, ...], _Goal] = {}
+        self._going: dict[tuple[int, ...], _Goal] = {}
+        self._told: dict[tuple[int, ...], _Goal] = {}
+        self._back_ns = -1
         self._does: list[tuple[str, int, Any]] = []
 
     def attend(self, now: Moment, part: str, number: int, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -148,10 +155,17 @@ class ServedAction:
         elif part == "get_result":
             self._ask_for_result(number, tuple(request["goal_id"]["uuid"]))
         else:
-            for goal in [one for one in self._goals.values() if one.wake_ns is not None and one.wake_ns <= now.t_ns]:
+            for goal in [one for one in self._going.values() if one.wake_ns is not None and one.wake_ns <= now.t_ns]:
                 self._go_on(goal, now, lambda one=goal: next(one.steps))  # type: ignore[misc]
-        wakes = {one.wake_ns for one in self._goals.values() if one.wake_ns is not None and one.wake_ns > now.t_ns}
-        return {"does": self._does, "wakes_ns": sorted(wakes)[:1]}
+        return {"does": self._does, "wakes_ns": self._wakes_ns(now)}
+
+    def _wakes_ns(self, now: Moment) -> list[int]:
+        """Return when to come back; empty if that was said before, or for no goal: else each request adds a visit."""
+        wakes = [one.wake_ns for one in self._going.values() if one.wake_ns is not None and one.wake_ns > now.t_ns]
+        if not wakes or now.t_ns < self._back_ns <= min(wakes):
+            return []
+        self._back_ns = min(wakes)
+        return [self._back_ns]
 
     def _begin(self, now: Moment, number: int, request: Mapping[str, Any]) -> None:
         wanted = built(self._kind.Goal, request["goal"], self.name)
@@ -169,9 +183,9 @@ class ServedAction:
         accepted = {"accepted": True, "stamp": _time(now.clock_ns)}
         self._does = [*before, ("send_goal", number, accepted), *self._does]
         if goal.wake_ns is not None:
-            self._tell_status()
-        for other in [one for one in self._goals.values() if one is not goal and one.wake_ns is not None]:
-            if self.preempts:
+            self._tell_status(goal)
+        if self.preempts:
+            for other in [one for one in self._going.values() if one is not goal]:
                 self._go_on(other, now, lambda one=other: one.steps.throw(GoalAborted()))  # type: ignore[misc]
 
     def _steps(self, goal: Any) -> Steps:
@@ -200,6 +214,7 @@ class ServedAction:
                     self._publish("feedback", message)
                 elif pause_ns := self._pause_ns(step):
                     goal.wake_ns = now.t_ns + pause_ns
+                    self._going[goal.uuid] = goal
                     return
                 step = next(goal.steps)
             raise RuntimeError(f"{self.name}: expected a pause, found {MOST_STEPS:,} steps at one moment")
@@ -229,7 +244,8 @@ class ServedAction:
             found = type(result).__name__
             raise TypeError(f"{self.name}: expected a result of {self.type}, found {found}")
         goal.status, goal.wake_ns, goal.result = status, None, plain_fields(result)
-        self._tell_status()
+        self._going.pop(goal.uuid, None)
+        self._tell_status(goal)
         asked, goal.asked = goal.asked, []
         for number in asked:
             self._ask_for_result(number, goal.uuid)
@@ -260,12 +276,16 @@ class ServedAction:
         for goal in going:
             goal.status = GoalState.CANCELING
         if going:
-            self._tell_status()
+            self._tell_status(*going)
         for goal in going:
             self._go_on(goal, now, lambda one=goal: one.steps.throw(GoalCanceled()))  # type: ignore[misc]
 
-    def _tell_status(self) -> None:
-        known = [{"goal_info": _info(one), "status": int(one.status)} for one in self._goals.values()]
+    def _tell_status(self, *changed: _Goal) -> None:
+        for goal in changed:
+            self._told.pop(goal.uuid, None)
+            self._told[goal.uuid] = goal
+        self._told = dict(list(self._told.items())[-MOST_TOLD:])
+        known = [{"goal_info": _info(one), "status": int(one.status)} for one in self._told.values()]
         self._publish("status", built(message_class(STATUS_TYPE), {"status_list": known}, self.name))
 
     def _publish(self, topic: str, message: Any) -> None:

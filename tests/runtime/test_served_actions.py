@@ -8,7 +8,7 @@ import pytest
 from test_msgs.action import Fibonacci
 
 from grader.runtime.model.quantities import NS_PER_S
-from grader.runtime.served_actions import GoalAborted, GoalRejected, ServedAction
+from grader.runtime.served_actions import MOST_TOLD, GoalAborted, GoalRejected, ServedAction
 from grader.runtime.simulation import Moment
 
 ID = [1] * 16
@@ -72,3 +72,33 @@ def test_many_feedbacks_and_empty_pauses_come_at_one_moment() -> None:
     """More than a recursion would bear."""
     steps = [*([Fibonacci.Feedback(), 0.0] * 2000), 1.0]
     assert [part for part, _, _ in served(steps)].count("feedback") == 2000
+
+
+def test_a_client_that_sends_without_end_costs_no_more_with_each_goal() -> None:
+    """A status names the goals that changed last, and a wake is said once however many requests come before it."""
+    action = ServedAction("/count", "test_msgs/action/Fibonacci", [1.0])
+    does: list[tuple[str, int, Any]] = []
+    waiting: list[int] = []
+    visits = 0
+    for number in range(1, 201):
+        now = number * NS_PER_S // 10
+        while waiting and min(waiting) <= now:  # as an agenda
+            waiting.remove(at_ns := min(waiting))
+            visits += 1
+            answer = action.attend(Moment(at_ns, at_ns), "", 0, {})
+            does, waiting = [*does, *answer["does"]], [*waiting, *answer["wakes_ns"]]
+        uuid = {"uuid": [number] * 16}
+        for part, request in (
+            ("send_goal", {"goal_id": uuid, "goal": {"order": 3}}),
+            ("get_result", {"goal_id": uuid}),
+        ):
+            answer = action.attend(Moment(now, now), part, number, request)
+            does, waiting = [*does, *answer["does"]], [*waiting, *answer["wakes_ns"]]
+    results = [number for part, number, _ in does if part == "get_result"]
+    assert results == list(range(1, 191))
+    assert visits == len(results)
+    assert len(waiting) == 1
+    told = [message.status_list for part, _, message in does if part == "status"]
+    assert len(told) == 200 + len(results)
+    assert max(map(len, told)) == MOST_TOLD
+    assert [(each[-1].goal_info.goal_id.uuid[0], each[-1].status) for each in told[-2:]] == [(190, 4), (200, 2)]
