@@ -14,7 +14,7 @@ from typing import TypeVar
 from grader.runtime.host.clock import EPOCH_NS, EPOCH_SPAN_S, UPTIME_NS, UPTIME_SPAN_S
 from grader.runtime.host.packages import layout_of
 from grader.runtime.model.dataclass import dataclass
-from grader.runtime.model.limits import Limits
+from grader.runtime.model.limits import MAX_NAME_BYTES, Limits
 from grader.runtime.model.projects import Project
 from grader.runtime.model.quantities import NS_PER_S
 from grader.runtime.model.scenario import Event, Planned, RunOptions, Scenario, is_launch_file, longest, shortest
@@ -75,6 +75,13 @@ class PlannedConnection:
     seed: str
 
 
+def _is_plain(name: str) -> bool:
+    """Whether a name has ASCII letters, digits, hyphens, underscores and dots only, and an ending."""
+    stem, _, ending = name.rpartition(".")
+    known = f"_{stem}".replace("-", "_").replace(".", "_").isidentifier()
+    return known and ending.isalnum() and name.isascii() and len(name) <= MAX_NAME_BYTES
+
+
 @dataclass(frozen=True, slots=True)
 class PlannedStart:
     """What one process is started with.
@@ -111,6 +118,14 @@ class PlannedStart:
         files = [f"--params-file {quote(name)}" for name, _ in self.parameter_files]
         ros = [*map(quote, self.ros_arguments), *files]
         return " ".join([*map(quote, self.arguments), *(["--ros-args", *ros] if ros else [])])
+
+    @property
+    def copied_files(self) -> tuple[tuple[str, str], ...]:
+        """Name and text of the copies of parameter files that the process reads; rcl names a copy that it cannot read.
+
+        A copy has the name of its file, unless that is not plain: a launch file gives single values as well.
+        """
+        return tuple((name if _is_plain(name) else "parameters.yaml", text) for name, text in self.parameter_files)
 
     @property
     def problem(self) -> str:

@@ -12,7 +12,7 @@ from test_msgs.action import Fibonacci
 
 from grader.runtime.model.errors import RecordingError, SubmissionError
 from grader.runtime.served_actions import GoalAborted, GoalRejected
-from grader.world.errors import StepTimeout
+from grader.world.errors import ProgramFailed, StepTimeout
 from grader.world.opening import Worlds
 from grader.world.started import Program
 from grader.world.world import World
@@ -153,6 +153,9 @@ def test_parameter_files_lie_beside_the_test(ros_session: Worlds, write: Write, 
         said = [program.logs[-1].text for program in programs]
         assert said == ["[1, 1, 1.5]", "[1, 2, 2.0]", "[1, 1, 1.5]", "[3, 2, 0.0]"]
         with pytest.raises(SubmissionError, match=r"two\.yaml: expected a parameter file, found none"):
+            ros.run("node.py", parameters="two.yaml")
+        (tmp_path / "two.yaml").write_text("node:\n  a: 1\n")
+        with pytest.raises(ProgramFailed, match=r"/two\.yaml'\. Error: .* at line 2,"):
             ros.run("node.py", parameters="two.yaml")
     with ros_session.open(tmp_path) as ros:
         ros.run("node.py", parameters=["one.yaml", {"ab": 1}])

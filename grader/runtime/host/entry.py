@@ -60,9 +60,11 @@ def shadows_of(request: Mapping[str, Any]) -> Shadows:
 def command_line(request: Mapping[str, Any]) -> list[str]:
     """Return the arguments of the program; parameter files are written to the folder for temporary files."""
     given = list(request.get("ros_arguments", ()))
-    for number, (_, text) in enumerate(request.get("parameter_files", ()), 1):
+    for number, (name, text) in enumerate(request.get("parameter_files", ()), 1):
         # Files, as `ros2 run` has them: rclpy reads parameters from files or from single arguments only.
-        path = os.path.join(os.environ.get("HOME") or tempfile.gettempdir(), f"parameters_{os.getpid()}_{number}.yaml")
+        folder = os.path.join(os.environ.get("HOME") or tempfile.gettempdir(), f"parameters_{os.getpid()}_{number}")
+        os.makedirs(folder, exist_ok=True)
+        path = os.path.join(folder, name)
         with open(path, "w", encoding="utf-8") as file:
             file.write(text)
         given += ["--params-file", path]

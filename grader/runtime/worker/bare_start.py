@@ -94,8 +94,9 @@ def _with_parameter_files(given: PlannedStart) -> str:
     return f"""
 import os, sys
 sys.argv += {["--ros-args"] if not given.ros_arguments else []!r}
-for _number, _text in enumerate({[text for _, text in given.parameter_files]!r}):
-    _path = os.path.join(os.environ["HOME"], f"parameters_{{os.getpid()}}_{{_number}}.yaml")
+for _number, (_name, _text) in enumerate({given.copied_files!r}, 1):
+    _path = os.path.join(os.environ["HOME"], f"parameters_{{os.getpid()}}_{{_number}}", _name)
+    os.makedirs(os.path.dirname(_path), exist_ok=True)
     open(_path, "w", encoding="utf-8").write(_text)
     sys.argv += ["--params-file", _path]
 """

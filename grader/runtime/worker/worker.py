@@ -372,7 +372,7 @@ class Worker:
             "executable": start.executable,
             "arguments": start.arguments,
             "ros_arguments": start.ros_arguments,
-            "parameter_files": start.parameter_files,
+            "parameter_files": start.copied_files,
             "scripts": plan.scripts_of(file),
             "installed": plan.is_installed(file, start.executable),
             "imported": plan.imported,

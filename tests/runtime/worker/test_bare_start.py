@@ -95,6 +95,22 @@ def test_a_program_gets_its_arguments(tmp_path: Path, monkeypatch: pytest.Monkey
     assert without == f"{['hello', '--ros-args', '--params-file']} {GIVEN.parameter_files[0][1]}"
 
 
+@pytest.mark.parametrize(
+    ("name", "copied"),
+    [
+        *((name, name) for name in ("own.yaml", "2-wheels.sim.yml")),
+        *(
+            (name, "parameters.yaml")
+            for name in ("", "..", "../x.yaml", "{a: 1.5}", "a\nb.yaml", "ä.yaml", "no_ending")
+        ),
+        ("x" * 300 + ".yaml", "parameters.yaml"),
+    ],
+)
+def test_a_parameter_file_keeps_a_plain_name(name: str, copied: str) -> None:
+    """No other name comes to a path: those of launch files are the student's, and may be anything."""
+    assert PlannedStart("a.py", parameter_files=((name, "text"),)).copied_files == ((copied, "text"),)
+
+
 def test_arguments_keep_a_script_a_script(tmp_path: Path) -> None:
     """Without parameter files nothing has to be written."""
     (tmp_path / "a.py").write_text(SAYS)
