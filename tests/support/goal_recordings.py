@@ -20,7 +20,7 @@ class Client(Recording):
 
     def offered(self) -> Client:
         """Offer the action."""
-        self.mark(0, "server_starts", f"{ACTION}/_action/send_goal")
+        self.mark(0, "action_starts", f"{ACTION} {TYPE}").mark(0, "server_starts", f"{ACTION}/_action/send_goal")
         return self
 
     def goal(self, t_s: float, number: int, order: int, *, accepted: bool = True) -> Client:

@@ -335,7 +335,8 @@ class Mark:
     (detail: the service of the grader's server), `process_starts` (detail: a process that starts late), `exited`
     (detail: a process that was allowed to exit, and did with code 0), `stop_signal` (detail: the process that received
     it), `stopped` (detail: a process that ended with code 0 or by that signal after it), `limit` (detail: a sentence),
-    `simulation_hears` (detail: a topic and a message type that a simulation of the rubric takes there).
+    `simulation_hears` (detail: a topic and a message type that a simulation of the rubric takes there),
+    `action_starts` (detail: an action that the grader offers, and its type).
     """
 
     t_ns: int

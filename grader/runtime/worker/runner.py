@@ -378,6 +378,7 @@ class Runner(ABC):
 
     def _offer_action(self, action: str, interface: str, now_ns: int) -> None:
         """Advertise the topics of an action, and offer its services."""
+        self._recorder.add(Mark(now_ns, "action_starts", f"{action} {interface}"))
         for topic, (type_, latched) in TOPICS_OF_ACTIONS.items():
             name, fields = f"{action}/_action/{topic}", {"best_effort": False, "latched": latched}
             stream = PlannedMessages(name, type_.format(interface), 0, 0, 1, 0, values=(), **fields)

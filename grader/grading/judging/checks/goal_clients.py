@@ -351,6 +351,14 @@ def explain_no_goal(trace: Trace, action: str) -> Finding:
     clients = {e.service.partition("/_action/")[0]: e for e in trace.service_ends("client") if "/_action/" in e.service}
     told = observed(trace)
     if action in clients:
+        type_ = clients[action].type.removesuffix("_SendGoal")
+        offered = dict(mark.detail.split(" ") for mark in trace.marks("action_starts"))
+        wanted = offered.get(action, type_)
+        if type_ != wanted:
+            reason = f"{action}: {quote(clients[action].node)} has a client of type {quote(type_)}, expected {wanted}"
+            evidence = {"action": action, "type": type_, "node": clients[action].node}
+            hint = f"create the ActionClient with {wanted}"
+            return not_met(reason, evidence, hint=hint, problem=ProblemKind.OTHER_TYPE)
         reason = f"{action}: {quote(clients[action].node)} has a client and sends no goal in {told}"
         return not_met(reason, {"node": clients[action].node}, problem=ProblemKind.SILENT)
     other = nearest(action, clients) or next(iter(clients), None)

@@ -75,6 +75,19 @@ def _other_action(case: Case) -> Clue | None:
     return Clue(hint, source.place(origin), key=f"action:{source.file}:{call.lineno}")
 
 
+@hint_rule(*CLIENT_CHECKS, problem=ProblemKind.OTHER_TYPE, priority=3515)
+def _other_action_type(case: Case) -> Clue | None:
+    """A client of the action has another type."""
+    source, wanted = case.source, case.check.action
+    calls = [
+        c for c in source.calls("ActionClient") if goes_to(text_in_code(source, argument(c, 2, "action_name")), wanted)
+    ]
+    if len(calls) != 1:
+        return None
+    hint = f"{source.code(calls[0])} has another type than the server of {wanted}"
+    return Clue(hint, source.place(calls[0]), key=f"action:{source.file}:{calls[0].lineno}")
+
+
 @hint_rule(*CLIENT_CHECKS, problem=ProblemKind.SILENT, priority=3520)
 def _no_goal_sent(case: Case) -> Clue | None:
     """There is a client, and no goal: nothing sends one, nothing calls what does, or the server is not there yet."""

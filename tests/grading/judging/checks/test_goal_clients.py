@@ -159,6 +159,10 @@ def test_why_no_goal_came(check: SendsGoals | CancelsGoal | AfterGoal) -> None:
     assert why(other) == (ProblemKind.OTHER_NAME, "name the action /count instead of /cout")
     silent = client().service("client", f"{ACTION}/_action/send_goal", f"{TYPE}_SendGoal")
     assert why(silent)[0] is ProblemKind.SILENT
+    typed = client().service("client", f"{ACTION}/_action/send_goal", "test_msgs/action/NestedMessage_SendGoal")
+    assert why(typed) == (ProblemKind.OTHER_TYPE, f"create the ActionClient with {TYPE}")
+    reason = f"/count: /node has a client of type test_msgs/action/NestedMessage, expected {TYPE}"
+    assert check.judge(typed.trace()).reason == reason
     crashed = check.judge(client().crashed(1).trace())
     assert "fault" in crashed.evidence
     with pytest.raises(HarnessError):

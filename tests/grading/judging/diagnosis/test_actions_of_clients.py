@@ -43,10 +43,10 @@ def rejected() -> Client:
     return client().goal(1, 1, 5, accepted=False).goal(2, 2, 6)
 
 
-def without_goals(service: str) -> Client:
+def without_goals(service: str, type_: str = "test_msgs/action/Fibonacci") -> Client:
     """Return a recording of a client that sends nothing."""
     recording = client()
-    recording.service("client", service, "test_msgs/action/Fibonacci_SendGoal")
+    recording.service("client", service, f"{type_}_SendGoal")
     return recording
 
 
@@ -71,6 +71,15 @@ CASES: list[tuple[str, str, dict[str, Any], Client, str, str, str]] = [
         RIGHT.replace('"count"', '"counts"'),
         '5: ActionClient(self, Fibonacci, "counts") asks for counts: the task asks for /count',
         RIGHT,
+    ),
+    (
+        "other_action_type",
+        "sends_goals",
+        {},
+        without_goals(f"{ACTION}/_action/send_goal", "test_msgs/action/NestedMessage"),
+        RIGHT.replace('Fibonacci, "count"', 'NestedMessage, "count"'),
+        '5: ActionClient(self, NestedMessage, "count") has another type than the server of /count',
+        "",
     ),
     (
         "no_goal_sent",

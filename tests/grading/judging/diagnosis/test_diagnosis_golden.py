@@ -178,6 +178,7 @@ def test_every_rule_is_shown_to_work() -> None:
     shown = {row["cause"] for row in (*CRASHES, *BEHAVIOURS, *SLIPS)} | {v["evidence"].get(CAUSE_KEY) for v in verdicts}
     shown |= {cause for _, _, _, cause in LAUNCH_SLIPS}
     shown |= {"unheard_by_simulation"}  # test_simulated.py
+    shown |= {"other_action_type"}  # test_actions_of_clients.py
     shown |= {row["cause"] for table in EXAMPLE_SLIPS for row in table}  # tests/test_example_slips.py
     # it only names another criterion, so that reports do not name it
     shown |= {"follows" for v in verdicts if v.get("same_cause_as") and CAUSE_KEY not in v["evidence"]}
