@@ -432,6 +432,7 @@ def generate_launch_description():
     failure, _, warning = result.stdout.str().partition("warnings summary")
     for text in (failure, warning):
         assert "the event handler OnProcessExit was left out: only lists of actions" in text
+        assert "usb_cam/usb_cam_node was not started: the workspace has no package usb_cam" in text
 
 
 IMPORTS_PLAINLY = """

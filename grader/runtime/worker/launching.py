@@ -198,6 +198,7 @@ def _launched(name: str, report: LaunchReport, plan: Plan, places: Places) -> Ev
             return _failed(name, f"{text} {folder}/{IGNORED}", _place(name, node, places), left_out, unstarted)
         # Where a program runs in place, its workspace is complete: another package's executable is another program.
         is_complete = bool(plan.working and plan.projects)
+        whole = "workspace" if plan.working else "submission"  # of which a message says what it lacks
         loose = None if known_package or is_complete else find_loose(root, wanted)
         look = find_executable(root, plan.projects, package, wanted) if known_package else loose
         # A package that is misspelt is not there, even if a file of the same name lies elsewhere.
@@ -209,17 +210,17 @@ def _launched(name: str, report: LaunchReport, plan: Plan, places: Places) -> Ev
                 continue
             # As in ROS, where a launch file that names a program its package lacks starts nothing at all.
             if known_package or near:
-                text = _not_found(package, wanted, found, executables(root, plan.projects), near)
+                meant = f"the {whole} has {near}" if near else ""
+                text = _not_found(package, wanted, found, executables(root, plan.projects), meant)
                 return _failed(name, text, where, left_out, unstarted)
-            lacking = _lacking(package, "workspace" if is_complete else "submission")
-            sentence = f"{where}: {_program(package, wanted)} was not started: {lacking}"
+            sentence = f"{where}: {_program(package, wanted)} was not started: {_lacking(package, whole)}"
             if package in ONLY_LOOKING:
                 notes.append(sentence)
             else:
                 unstarted.append((sentence, ""))
             continue
         if not known_package:
-            notes.append(f"{where}: {_lacking(package)}; {found.file} was started")
+            notes.append(f"{where}: {_lacking(package, whole)}; {found.file} was started")
         made = _added(made, name, node, found, where, known)
         named[number] = made.processes[-1][0]
         if problem := made.starts[-1].problem:
@@ -323,13 +324,13 @@ def _program(package: str, wanted: str) -> str:
     return f"{package}/{wanted}" if plain else f"the program {quoted(f'{package}/{wanted}')}"
 
 
-def _lacking(package: str, where: str = "submission") -> str:
+def _lacking(package: str, where: str) -> str:
     return f"the {where} has no package {package if _NAME.fullmatch(package) else quoted(package)}"
 
 
-def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable], near: str) -> str:
-    if near:
-        return f"PackageNotFoundError: package {quoted(package)} not found; the submission has {near}"
+def _not_found(package: str, wanted: str, found: Executable | None, known: Sequence[Executable], meant: str) -> str:
+    if meant:
+        return f"PackageNotFoundError: package {quoted(package)} not found; {meant}"
     if found is not None:
         return f"SubstitutionFailure: {found.problem}"
     names = ", ".join(one.name for one in known if one.package == package)
